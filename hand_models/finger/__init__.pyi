@@ -3,9 +3,15 @@ from .closed_finger import (
     Refused as Refused,
     cling as cling,
     close_all as close_all,
+    straight_lift as straight_lift,
 )
 from .closure import settle_finger as settle_finger
 from .closure_loads import stays as stays, tendon_loads as tendon_loads
+from .finger_path import (
+    FingerPath as FingerPath,
+    closing_paths as closing_paths,
+    opening_paths as opening_paths,
+)
 from .fingernail import Fingernail as Fingernail
 from .model import PHALANGES as PHALANGES, FingerModel as FingerModel
 from .path_state import OpenFinger as OpenFinger

@@ -15,13 +15,14 @@ from hand_models.finger.path_state import (
     Records,
     drives,
     held_share,
+    open_states,
 )
 from hand_models.finger.phalanx_shape import PhalanxShape, fan_out
 from hand_models.finger.settings import CONTACT_CODES
 from hand_models.finger.settled_finger import JOINT_STOPS, Contact, SettledFinger
 from hand_models.sections import Complexes, Face, FingerRock, Flags, Outlines, Section
 
-__all__ = ["ClosedFinger", "Refused", "cling", "close_all"]
+__all__ = ["ClosedFinger", "Refused", "cling", "close_all", "starting_angles", "straight_lift"]
 
 
 class ClosedFinger(NamedTuple):
@@ -108,24 +109,52 @@ def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[Closed
     rocks = [closing.rock for closing in closings]
     rock = Outlines.of(rocks, model.reach + model.tile_length, shape.spacing)
     drive = drives(model, closings)
-    lower, straight = drive["lower"], np.clip(0.0, drive["lower"], drive["upper"])
-    blocked = _in_rock(rock, shape, drive, rocks, straight)
-    bent = blocked.nonzero()[0]
-    shut = blocked.copy()
+    q = starting_angles(rocks, rock, shape, drive)
+    lower, bent = drive["lower"], (q != _straight(drive)).any(axis=1).nonzero()[0]
+    shut = np.zeros(len(q), dtype=bool)
     shut[bent] = _in_rock(
         _some(rock, bent), shape, drive[bent], [rocks[i] for i in bent], lower[bent]
     )
     found = [
-        _refused(shape, each, q) if starts and each.sections else None
-        for each, q, starts in zip(rocks, lower, shut.tolist(), strict=True)
+        _refused(shape, each, angles) if starts and each.sections else None
+        for each, angles, starts in zip(rocks, lower, shut.tolist(), strict=True)
     ]
     going = np.array([i for i, each in enumerate(found) if each is None], dtype=np.intp)
     if not len(going):
         return [each for each in found if each is not None]
-    start = np.where(blocked[:, None], lower, straight)[going]
-    path = follow(_some(rock, going), shape, drive[going], start)
+    path = follow(_some(rock, going), shape, drive[going], open_states(q[going]))
     closed = _closed(model, [closings[i] for i in going.tolist()], *path)
     return [next(closed) if each is None else each for each in found]
+
+
+def starting_angles(
+    rocks: Sequence[FingerRock], rock: Outlines, shape: PhalanxShape, drive: Records
+) -> Array:
+    """Return the joint angles with which n fingers begin to close, shape (n, 3) [rad].
+
+    A finger begins straight, or, with rock in its way, at its joints' lower limits. ``rock``: that
+    of ``rocks``, as points along its boundary.
+    """
+    straight = _straight(drive)
+    blocked = _in_rock(rock, shape, drive, rocks, straight)
+    return np.asarray(np.where(blocked[:, None], drive["lower"], straight))
+
+
+def straight_lift(model: FingerModel, opened: OpenFinger) -> float:
+    """Return the lift along −z of F that clears a straight finger of rock [m].
+
+    Zero if no rock is in the finger; infinite if the finger's length is not enough.
+    """
+    shape, drive = PhalanxShape.of(model), drives(model, [opened])
+    rock = Outlines.of([opened.rock], model.reach + model.tile_length, shape.spacing)
+    q = _straight(drive)
+    if not opened.rock.sections or not _in_rock(rock, shape, drive, [opened.rock], q)[0]:
+        return 0.0
+    return _refused(shape, opened.rock, q[0]).lift
+
+
+def _straight(drive: Records) -> Array:
+    return np.asarray(np.clip(0.0, drive["lower"], drive["upper"]))
 
 
 def _some(rock: Outlines, fingers: Indices) -> Outlines:

@@ -31,7 +31,8 @@ ends where one that is tightened slowly would.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,14 +48,13 @@ from hand_models.finger.path_state import (
     STATE_FIELDS,
     Record,
     Records,
-    open_states,
 )
 from hand_models.finger.phalanx_gaps import put_around
 from hand_models.finger.phalanx_shape import PhalanxShape
 from hand_models.finger.settings import SETTINGS
 from hand_models.sections import Flags, Outlines
 
-__all__ = ["around_rock", "follow"]
+__all__ = ["Balanced", "around_rock", "follow"]
 
 
 def around_rock(rock: Outlines, shape: PhalanxShape, drive: Records, q: Array) -> Records:
@@ -81,10 +81,28 @@ def around_rock(rock: Outlines, shape: PhalanxShape, drive: Records, q: Array) -
     return found
 
 
+class Balanced(NamedTuple):
+    """A finger in balance on its path: arrays of one record each.
+
+    Attributes
+    ----------
+    state, around, forces : ndarray, shape (1,)
+        Records of `STATE_FIELDS`, of `AROUND_FIELDS` and of `LINEARISED_FIELDS` there.
+    """
+
+    state: Records
+    around: Records
+    forces: Records
+
+
 def follow(
-    rock: Outlines, shape: PhalanxShape, drive: Records, q: Array
+    rock: Outlines,
+    shape: PhalanxShape,
+    drive: Records,
+    start: Records,
+    courses: Sequence[list[Balanced]] | None = None,
 ) -> tuple[Records, Records, Flags]:
-    """Follow the closing paths of n fingers up to their closing tensions.
+    """Follow the closing paths of n fingers up to their closing tensions, or their opening paths.
 
     Parameters
     ----------
@@ -94,8 +112,10 @@ def follow(
         Dimensions of the phalanges, the same for all fingers.
     drive : ndarray, shape (n,)
         Tendons and springs, records of `DRIVE_FIELDS` (see `drives`).
-    q : ndarray, shape (n, 3)
-        Joint angles at the start [rad].
+    start : ndarray, shape (n,)
+        States at the start, records of `STATE_FIELDS`.
+    courses : sequence of list of Balanced, length n, optional
+        Written to: the balanced increments of each finger, in their order.
 
     Returns
     -------
@@ -106,18 +126,24 @@ def follow(
     resting : ndarray of bool, shape (n,)
         Whether each finger came to rest.
     """
-    states, around = open_states(q), around_rock(rock, shape, drive, q)
-    resting = np.zeros(len(q), dtype=bool)
+    states, around = start.copy(), around_rock(rock, shape, drive, start["q"])
+    resting = np.zeros(len(start), dtype=bool)
     for i, own in enumerate(zip(*rock, strict=True)):
         one = slice(i, i + 1)
+        course = None if courses is None else courses[i]
         states[one], around[one], resting[i] = _followed(
-            own, shape.record, drive[one], states[one], around[one]
+            own, shape.record, drive[one], states[one], around[one], course
         )
     return states, around, resting
 
 
 def _followed(
-    rock: tuple[Any, ...], shape: Records, drive: Records, state: Records, around: Records
+    rock: tuple[Any, ...],
+    shape: Records,
+    drive: Records,
+    state: Records,
+    around: Records,
+    course: list[Balanced] | None,
 ) -> tuple[Records, Records, bool]:
     """Return a finger at the end of its path, what is around it, and whether it came to rest."""
     after, there, trial = state.copy(), around.copy(), state.copy()
@@ -136,7 +162,10 @@ def _followed(
             return after, around, rests
         put_around(SETTINGS_RECORD, shape, depth, after["q"][0], there, *rock)
         put_forces(SETTINGS_RECORD, CODE_RECORD, drive, after, there, now)
-        if _judged(*fixed, state, around, after, there, now):
+        left = _judged(*fixed, state, around, after, there, now)
+        if left < np.inf:
+            if course is not None and left <= SETTINGS.balanced_torque * drive["torque"][0]:
+                course.append(Balanced(after.copy(), there.copy(), now.copy()))
             state, after, around, there = after, state, there, around
     return state, around, False
 
@@ -162,7 +191,7 @@ def _begun(settings: Record, code: Record, state: Record, around: Record, trial:
         trial.mode[j] = code.off if lets else state.mode[j]
         trial.q[j], trial.stop[j], trial.spines[j] = state.q[j], state.stop[j], state.spines[j]
         trial.been[j], trial.off[j] = state.been[j], state.off[j]
-        trial.normals[j] = state.normals[j]
+        trial.normals[j], trial.slides[j] = state.normals[j], state.slides[j]
     return least
 
 
@@ -233,7 +262,8 @@ def _increment(
         most = max(clear, settings.first_stride)
     most = min(state.stride, most)
     target = drive.closing if state.s < drive.closing else drive.end
-    more = min(target - state.s, settings.most_tension * drive.closing)
+    step = settings.most_lowering if drive.lowers else settings.most_tension
+    more = min(target - state.s, step * drive.closing)
     fastest = max(np.abs(grow).max(), settings.rounding)
     more = min(more, max(most - size, 0.0) / fastest)
     opens = False
@@ -251,7 +281,7 @@ def _increment(
             after.least[j] = max(around.gap[j], 0.0)
         after.spines[j] = now.spines[j]
         lost = around.gap[j] > after.least[j] + settings.lost_gap * shape.length
-        if now.spines[j] == code.pulled and lost:
+        if now.spines[j] == code.pulled and lost and not drive.lowers:
             after.spines[j] = code.lost
         rate = _product(around.d_gap, grow, j)
         opens |= caught and mode == code.off and rate > 0.0 and now.gap[j] < state.least[j]
@@ -259,12 +289,21 @@ def _increment(
             more = min(more, max((now.gap[j] + 2.0 * shape.closes) / -rate, 0.0))
         # and no contact pushes across a gap, or pulls where nothing holds it
         force, rate = now.normals[j, 0], now.normals[j, 1]
-        pulls = mode == code.on and not now.caught[j] and rate < 0.0
+        pulls = mode == code.on and (not now.caught[j] or now.slides[j] != 0) and rate < 0.0
         if rate > 0.0 if mode == code.held else pulls:
             forced = min(forced, -force / rate)
+        # or is dragged backwards against more than friction
+        force = now.shears[j] + drive.limits[4] * force * now.active[j]
+        rate = now.grows[j] + drive.limits[4] * rate * now.active[j]
+        if drive.lowers and caught and now.slides[j] == 0 and rate < 0.0:
+            forced = min(forced, max(-force / rate, 0.0))
     more = min(more, max(forced, settings.least_tension * drive.closing))
     # where a gap begins to grow, its least is to be that of the path, not of an increment beside it
     beside = size > settings.path_turn and opens and not air
+    if drive.lowers:
+        # from balance to balance
+        beside |= size > settings.balance_turn
+        beside |= state.damping * size > settings.balanced_torque * drive.torque
     if waits or turns_back or beside or size > most or now.clear < 1.0:
         more = 0.0
     part = min(now.clear, most / max(size, settings.still_turn)) * (0.5 if turns_back else 1.0)
@@ -278,11 +317,8 @@ def _increment(
         after.q[j], after.step[j], after.off[j] = state.q[j], 0.0, now.off[j]
     if waits:
         for j in range(JOINT_COUNT):
-            after.mode[j], after.stop[j], after.been[j] = (
-                state.mode[j],
-                state.stop[j],
-                state.been[j],
-            )
+            after.mode[j], after.stop[j] = state.mode[j], state.stop[j]
+            after.been[j], after.slides[j] = state.been[j], state.slides[j]
             after.normals[j], after.touches[j] = state.normals[j], state.touches[j]
             after.left[j] = state.left[j]
         return rests
@@ -291,7 +327,7 @@ def _increment(
     if not turns_back:
         after.damping = _falls(settings, drive, state.damping) if shrinks else state.damping
     for j in range(JOINT_COUNT):
-        after.mode[j], after.stop[j] = now.mode[j], now.stop[j]
+        after.mode[j], after.stop[j], after.slides[j] = now.mode[j], now.stop[j], now.slides[j]
         on = now.mode[j] == code.on
         after.been[j] = (state.been[j] or on) and around.share[j] > now.off[j]
         after.touches[j] = state.s if on and np.isnan(state.touches[j]) else state.touches[j]
@@ -301,7 +337,7 @@ def _increment(
         after.normals[j] = now.normals[j, 0] + more * now.normals[j, 1] if now.active[j] else 0.0
     for j in range(JOINT_COUNT):
         left = now.torque[j] + more * now.slope[j] - _product(now.stiffness, after.step, j)
-        left -= _product(around.b, after.normals, j)
+        left -= _product(now.arms, after.normals, j)
         after.left[j] = 0.0 if now.stop[j] != 0 else left
     return rests
 
@@ -320,17 +356,19 @@ def _judged(
     after: Record,
     there: Record,
     forces: Record,
-) -> bool:
-    """Return whether an increment is as its linearisation says; write the next stride and damping.
+) -> float:
+    """Return the largest torque left after an increment; infinite if that went too far [N·m].
 
-    They are written to the state after the increment, or to that before it where it is not.
+    The next stride and damping are written to the state after the increment, or, if it is not as
+    its linearisation says, to the state before it.
     """
     settings, code, shape, drive = settings[0], code[0], shape[0], drive[0]
     state, around, after, there, forces = state[0], around[0], after[0], there[0], forces[0]
-    wrong, damped, moved, deeper, air = 0.0, 0.0, 0.0, -np.inf, True
+    wrong, damped, moved, deeper, air, most = 0.0, 0.0, 0.0, -np.inf, True, 0.0
     for j in range(JOINT_COUNT):
-        left = forces.torque[j] - _product(there.b, after.normals, j)
+        left = forces.torque[j] - _product(forces.arms, after.normals, j)
         left = 0.0 if after.stop[j] != 0 else left
+        most = max(most, abs(left))
         wrong, damped = max(wrong, abs(left - after.left[j])), max(damped, abs(after.left[j]))
         moved = max(moved, abs(after.step[j]))
         deeper = max(deeper, min(around.gap[j], 0.0) - min(there.gap[j], 0.0))
@@ -344,11 +382,16 @@ def _judged(
         else:
             state.damping = _grows(settings, drive, after.damping, 0.5 * settings.damping)
         state.stride = max(0.3 * moved, settings.least_stride)
-        return False
+        return float(np.inf)
+    for j in range(JOINT_COUNT):
+        # spines of a finger that opens catch nothing anew
+        grip = max(around.share[j] - after.off[j], 0.0)
+        if drive.lowers:
+            after.off[j] = max(after.off[j], there.share[j] - grip)
     growth = 2.0 if wrong < settings.exact_torque * drive.torque else 1.3
     after.stride = min(growth * after.stride, settings.most_stride)
     # a damped increment that was as foreseen may be damped less
     falls = wrong <= 0.05 * damped + settings.rounding * drive.torque and moved > 0.0
     if falls and after.s >= drive.end and after.damping <= state.damping:
         after.damping = _falls(settings, drive, after.damping)
-    return True
+    return float(most)

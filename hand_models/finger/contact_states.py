@@ -30,12 +30,12 @@ __all__ = ["LINEARISED_FIELDS", "contact_states", "put_forces"]
 
 LINEARISED_FIELDS: Final = np.dtype(
     [
-        *((name, int, (JOINT_COUNT,)) for name in ("mode", "stop", "spines")),
+        *((name, int, (JOINT_COUNT,)) for name in ("mode", "stop", "spines", "slides")),
         ("off", float, (JOINT_COUNT,)),
         ("settled", int),
         *((name, int, (JOINT_COUNT,)) for name in ("active", "caught")),
-        *((name, float, (JOINT_COUNT,)) for name in ("torque", "slope", "shears")),
-        *((name, float, (JOINT_COUNT, JOINT_COUNT)) for name in ("stiffness", "damped")),
+        *((name, float, (JOINT_COUNT,)) for name in ("torque", "slope", "shears", "grows")),
+        *((name, float, (JOINT_COUNT, JOINT_COUNT)) for name in ("arms", "stiffness", "damped")),
         *((name, float, (JOINT_COUNT, 2)) for name in ("turn", "normals")),
         *((name, float) for name in ("size", "clear")),
         ("gap", float, (JOINT_COUNT,)),
@@ -43,15 +43,17 @@ LINEARISED_FIELDS: Final = np.dtype(
 )
 """Linearised solution of a finger in its contact state.
 
-``mode``, ``stop``, ``spines``, ``off``: contact of each phalanx, stop of each joint, spines of each
-tile and ψ, as in `STATE_FIELDS`. ``settled``: whether the contact state needs no further switch.
-``active``, ``caught``: whether each phalanx has a contact, and whether spines of its tile hold on
-the rock. ``torque``, ``slope``: torque of springs, tendon and drag on each joint [N·m], and its
-derivative by the path parameter s [m]. ``shears``: shear of each tile [N]. ``stiffness``:
-−∂(torque)/∂q, contact forces included [N·m/rad]; ``damped``: with damping. ``turn``, ``normals``:
-turns of the joints [rad] and normal loads of the contacts [N], in this increment and per newton of
-s. ``size``: the largest turn [rad]. ``clear``: part of the turn, at most 1, before another phalanx
-reaches the rock. ``gap``: gaps after the part of the turn that ``clear`` and the stride allow [m].
+``mode``, ``stop``, ``spines``, ``slides``, ``off``: contact of each phalanx, stop of each joint,
+spines of each tile, whether it slides, and ψ, as in `STATE_FIELDS`. ``settled``: whether the
+contact state needs no further switch. ``active``, ``caught``: whether each phalanx has a contact,
+and whether spines of its tile hold on the rock. ``torque``, ``slope``: torque of springs, tendon
+and drag on each joint [N·m], and its derivative by the path parameter s [m]. ``shears``, ``grows``:
+shear of each tile by its tendon [N], and per newton of s. ``arms``: b_ij, or where tile j slides
+b_ij + μ a_ij [m]. ``stiffness``: −∂(torque)/∂q, contact forces included [N·m/rad]; ``damped``: with
+damping. ``turn``, ``normals``: turns of the joints [rad] and normal loads of the contacts [N], in
+this increment and per newton of s. ``size``: the largest turn [rad]. ``clear``: part of the turn,
+at most 1, before another phalanx reaches the rock. ``gap``: gaps after the part of the turn that
+``clear`` and the stride allow [m].
 """
 
 
@@ -68,11 +70,14 @@ def _write_forces(
 ) -> None:
     """Write the torques of springs, tendons and drag on a finger in its contact state."""
     f, closing = min(state.s, drive.closing), state.s < drive.closing
+    way, friction = 1.0 if closing else 0.0, drive.limits[4]
     # share of the drag across gaps
     part = 0.0
-    if state.s > drive.closing:
+    if drive.lowers:
+        f, way, part = drive.closing - state.s, -1.0, 1.0
+    elif state.s > drive.closing:
         part = (state.s - drive.closing) / (settings.catching_part * drive.closing)
-    normals, d_shears, grows = np.empty(JOINT_COUNT), np.empty(JOINT_COUNT), np.empty(JOINT_COUNT)
+    normals, d_shears = np.empty(JOINT_COUNT), np.empty(JOINT_COUNT)
     for j in range(JOINT_COUNT):
         off = state.mode[j] == code.off
         share = _held(settings, around.share[j], state.off[j])
@@ -84,25 +89,34 @@ def _write_forces(
             drag = drive.drag[j] * (1.0 if dragged else part)
         found.shears[j], d_shears[j] = drag * share * f, drag * f
         # per newton of s
-        grows[j] = 0.0
-        if closing:
-            grows[j] = drag * share
+        found.grows[j] = 0.0
+        if drive.lowers and bears:
+            d_shears[j] = drive.drag[j] * drive.closing - drive.gain[j] * state.s
+            found.shears[j], found.grows[j] = share * d_shears[j], -share * drive.gain[j]
+        elif closing:
+            found.grows[j] = drag * share
         elif bears and not dragged:
-            grows[j] = drive.drag[j] / settings.catching_part * share
+            found.grows[j] = drive.drag[j] / settings.catching_part * share
         normals[j] = 0.0 if off else state.normals[j]
     for i in range(JOINT_COUNT):
         torque = f * drive.pull[i] - (drive.preload[i] + drive.stiffness[i] * state.q[i])
-        slope = drive.pull[i] if closing else 0.0
+        slope = way * drive.pull[i]
         for j in range(JOINT_COUNT):
+            found.arms[i, j] = around.b[i, j]
+            if state.slides[j]:
+                found.arms[i, j] += friction * around.a[i, j]
+                continue
             torque += around.a[i, j] * found.shears[j]
-            slope += around.a[i, j] * grows[j]
+            slope += around.a[i, j] * found.grows[j]
         found.torque[i], found.slope[i] = torque, slope
         for k in range(JOINT_COUNT):
             stiffness = drive.stiffness[i] if i == k else 0.0
             for j in range(JOINT_COUNT):
                 stiffness += normals[j] * around.d_b[i, j, k]
-                stiffness -= found.shears[j] * around.d_a[i, j, k]
-                stiffness -= around.a[i, j] * d_shears[j] * around.d_share[j, k]
+                shear = -friction * normals[j] if state.slides[j] else found.shears[j]
+                stiffness -= shear * around.d_a[i, j, k]
+                if not state.slides[j]:
+                    stiffness -= around.a[i, j] * d_shears[j] * around.d_share[j, k]
             found.stiffness[i, k] = stiffness
 
 
@@ -148,12 +162,7 @@ def _eliminate(A: Array, b: Array) -> None:
 
 @compiled()
 def _solve(
-    settings: Record,
-    drive: Record,
-    state: Record,
-    around: Record,
-    apart: Array,
-    found: Record,
+    settings: Record, drive: Record, state: Record, around: Record, apart: Array, found: Record
 ) -> None:
     """Write turns of joints and normals of contacts: now, and per newton.
 
@@ -172,7 +181,7 @@ def _solve(
             for k in range(n):
                 A[i, k] = found.damped[i, k]
                 if found.active[k]:
-                    A[i, n + k] = around.b[i, k]
+                    A[i, n + k] = found.arms[i, k]
         if found.active[i]:
             for k in range(n):
                 A[n + i, k] = around.d_gap[i, k]
@@ -204,7 +213,7 @@ def _over(
     ratio = min(max(math.atan2(pulls, shears) / steepest, 0.0), 1.0)
     strength = most - (most - weakest) * ratio**exponent
     # the drag that a pull needs at last: without a tension nothing would stay that springs pull
-    drag = drive.drag[j] * drive.closing
+    drag = shears if drive.lowers else drive.drag[j] * drive.closing
     beyond = max(math.hypot(shears, pulls) - strength, friction * pulls - drag)
     return float(least * beyond - settings.rounding)
 
@@ -224,7 +233,7 @@ def _code(state: Record, around: Record) -> int:
         code = 3 * code + state.mode[j]
         code = 3 * code + state.stop[j] + 1
         code = 3 * code + state.spines[j]
-        code = 3 * code + (1 if around.share[j] > state.off[j] else 0)
+        code = 3 * code + (1 if around.share[j] > state.off[j] else 0) + state.slides[j]
     return code
 
 
@@ -240,7 +249,7 @@ def _try(
     found: Record,
 ) -> None:
     """Write what becomes of a finger in its contact state, and this after the next switch."""
-    gives, slack, nothing = settings.held_gap * shape.length, shape.closes, np.zeros(JOINT_COUNT)
+    gives, deep, nothing = settings.held_gap * shape.length, shape.closes, np.zeros(JOINT_COUNT)
     _write_forces(settings, code, drive, state, around, found)
     apart, share = nothing.copy(), nothing.copy()
     for j in range(JOINT_COUNT):
@@ -264,8 +273,7 @@ def _try(
     part = min(clear, state.stride / max(size, settings.still_turn))
     # damped joints may be slow in leaving where they should not be
     slow = state.damping > settings.slow_damping * drive.torque
-    over, cannot, moves = nothing.copy(), nothing.copy(), nothing.copy()
-    settled = True
+    over, cannot, moves, settled = nothing.copy(), nothing.copy(), nothing.copy(), True
     pushes, closes = np.zeros(JOINT_COUNT, np.bool_), np.zeros(JOINT_COUNT, np.bool_)
     for j in range(JOINT_COUNT):
         normal, caught, mode = found.normals[j, 0], found.caught[j], state.mode[j]
@@ -275,15 +283,15 @@ def _try(
         if active:
             # contacts that would pull more than they hold, or push across a gap
             if not (caught and (part < 1.0 or size > settings.balance_turn)):
-                over[j] = _over(settings, drive, j, share[j], found.shears[j], normal)
+                grip = 0.0 if state.slides[j] else share[j]
+                over[j] = _over(settings, drive, j, grip, found.shears[j], normal)
             pushes[j] = mode == code.held and normal > settings.rounding
             # contacts that joints cannot bring to the rock, as others or stops are in the way
-            if mode == code.on:
-                cannot[j] = settings.contact_compliance * normal - gives
+            cannot[j] = settings.contact_compliance * normal - gives if mode == code.on else 0.0
         else:
             # gaps that would close, or grow beyond what spines let them
             nears = change[j] < 0.0 and around.gap[j] > settings.near_gap * shape.length
-            closes[j] = not nears and gap < -slack and (change[j] < 0.0 or not slow)
+            closes[j] = not nears and gap < -deep and (change[j] < 0.0 or not slow)
             if closes[j]:
                 moves[j] = -gap
             elif caught and gap > least[j] + gives and (change[j] > 0.0 or not slow):
@@ -291,12 +299,20 @@ def _try(
         settled &= not (over[j] > 0.0 or pushes[j] or moves[j] > 0.0 or cannot[j] > 0.0)
         found.mode[j], found.stop[j], found.spines[j] = mode, state.stop[j], state.spines[j]
         found.off[j] = state.off[j]
+        # a tile that is pressed slides backwards against friction; one that is not lets go
+        force = found.shears[j] + drive.limits[4] * normal - settings.rounding * state.slides[j]
+        slides = drive.lowers and active and caught and normal > settings.rounding and force < 0.0
+        found.slides[j] = 1 if slides else 0
+        settled &= found.slides[j] == state.slides[j]
+        if drive.lowers and caught and not active:
+            over[j] = -found.shears[j] - settings.rounding
+            settled &= over[j] <= 0.0
         there = state.q[j] + part * found.turn[j, 0]
         if state.stop[j] != 0:
             balance = found.torque[j]
             for k in range(JOINT_COUNT):
                 balance -= found.damped[j, k] * found.turn[k, 0]
-                balance -= around.b[j, k] * found.normals[k, 0] * found.active[k]
+                balance -= found.arms[j, k] * found.normals[k, 0] * found.active[k]
             if state.stop[j] * balance < -settings.rounding * drive.torque:
                 found.stop[j], settled = 0, False
         elif there > drive.upper[j] + settings.still_turn:
@@ -376,6 +392,7 @@ def contact_states(
         for j in range(JOINT_COUNT):
             state.mode[j], state.stop[j] = found.mode[j], found.stop[j]
             state.spines[j], state.off[j] = found.spines[j], found.off[j]
+            state.slides[j] = found.slides[j]
         _try(settings, code, shape, drive, state, around, least, found)
         codes[count] = _code(found, around)
         count += 1

@@ -57,21 +57,23 @@ SHAPE_FIELDS: Final = PhalanxShape(*[0.0] * len(PhalanxShape._fields)).record.dt
 
 DRIVE_FIELDS: Final = np.dtype(
     [
-        *((name, float, _EACH_JOINT) for name in ("pull", "drag", "depth")),
+        *((name, float, _EACH_JOINT) for name in ("pull", "drag", "gain", "depth")),
         *((name, float) for name in ("closing", "end", "torque")),
         ("limits", float, (5,)),
+        ("lowers", int),
         *((name, float, _EACH_JOINT) for name in ("stiffness", "preload", "lower", "upper")),
     ]
 )
-"""Tendon torques, springs, joint limits and tile strengths of a closing finger.
+"""Tendon torques, springs, joint limits and tile strengths of a closing or opening finger.
 
-``pull``, ``drag``: M r, the tendon's torque about each joint per newton of tension [m]; M τ, the
-shear of each tile per newton of tension. ``depth``: depth to which the closing tension presses
-tiles into their beds of springs [m]. ``closing``: closing tension [N]; ``end``: path parameter s at
-the end of the path [N]; ``torque``: the tendon's torque about the proximal joint at the closing
-tension [N·m]. ``limits``: strength of the surface, f_max [N], f_min [N], φ_max [rad], exponent p
-and friction μ. ``stiffness``, ``preload``, ``lower``, ``upper``: spring stiffness [N·m/rad], spring
-preload [N·m] and angle limits [rad] of the joints.
+``pull``, ``drag``, ``gain``: M r, the tendon's torque about each joint per newton of tension [m];
+M τ, the shear of each tile per newton of tension while it closes; M g, the same once it has closed.
+``depth``: depth to which the closing tension presses tiles into their beds of springs [m].
+``closing``: closing tension [N]; ``end``: path parameter s at the end of the path [N]; ``torque``:
+the tendon's torque about the proximal joint at the closing tension [N·m]. ``limits``: strength of
+the surface, f_max [N], f_min [N], φ_max [rad], exponent p and friction μ. ``lowers``: whether the
+tension is lowered from the closing tension. ``stiffness``, ``preload``, ``lower``, ``upper``:
+spring stiffness [N·m/rad], spring preload [N·m] and angle limits [rad] of the joints.
 """
 
 AROUND_FIELDS: Final = np.dtype(
@@ -98,7 +100,7 @@ STATE_FIELDS: Final = np.dtype(
     [
         ("q", float, _EACH_JOINT),
         ("s", float),
-        *((name, int, _EACH_JOINT) for name in ("mode", "stop", "spines", "been")),
+        *((name, int, _EACH_JOINT) for name in ("mode", "stop", "spines", "been", "slides")),
         *((name, float, _EACH_JOINT) for name in ("off", "least", "normals", "touches")),
         *((name, float) for name in ("damping", "stride")),
         *((name, float, _EACH_JOINT) for name in ("step", "left")),
@@ -108,15 +110,17 @@ STATE_FIELDS: Final = np.dtype(
 
 ``q``: joint angles [rad]. ``s``: path parameter [N]: the tension, from 0 to the closing tension;
 beyond that, up to ``catching_part`` of the closing tension more, the drag on spines across gaps
-grows to full. ``mode``, ``stop``, ``spines``: contact of each phalanx, off, on or held; stop of
-each joint, +1 at the upper limit, −1 at the lower, else 0; spines of each tile, caught, pulled or
-lost (codes of `ContactCodes`). ``been``: whether the phalanx has touched the rock since its spines
-caught. ``off``: ψ, share of the tile's spines that were pulled off and have not caught again.
-``least``: m, least gap since the spines caught; after a pull-off, the gap at which it happened [m].
-``normals``: normal load of each contact [N]. ``touches``: value of ``s`` at which the phalanx first
-touched the rock [N]; NaN if it never did. ``damping``, ``stride``: damping D of the joints
-[N·m/rad]; largest turn of a joint in the next increment [rad]. ``step``: turn of the joints in the
-last increment [rad]. ``left``: torque residual that the linearisation predicts after it [N·m].
+grows to full. Where ``lowers``, it is how far the tension has been lowered. ``mode``, ``stop``,
+``spines``: contact of each phalanx, off, on or held; stop of each joint, +1 at the upper limit, −1
+at the lower, else 0; spines of each tile, caught, pulled or lost (codes of `ContactCodes`).
+``been``: whether the phalanx has touched the rock since its spines caught. ``slides``: whether the
+tile slides away from the finger's base, against friction. ``off``: ψ, share of the tile's spines
+that were pulled off and have not caught again. ``least``: m, least gap since the spines caught;
+after a pull-off, the gap at which it happened [m]. ``normals``: normal load of each contact [N].
+``touches``: value of ``s`` at which the phalanx first touched the rock [N]; NaN if it never did.
+``damping``, ``stride``: damping D of the joints [N·m/rad]; largest turn of a joint in the next
+increment [rad]. ``step``: turn of the joints in the last increment [rad]. ``left``: torque residual
+that the linearisation predicts after it [N·m].
 """
 
 
@@ -161,6 +165,7 @@ def drives(model: FingerModel, closings: Sequence[OpenFinger]) -> Records:
     surfaces = [closing.surface for closing in closings]
     found["pull"] = losses * np.array(model.pulley_radii)
     found["drag"] = losses * np.array(model.engagement)
+    found["gain"] = losses * np.array(model.shear_gain)
     depths = np.array([model.depths(each.base_tile) for each in closings])
     found["depth"] = closing[:, None] * depths
     found["closing"], found["end"] = closing, (1.0 + SETTINGS.catching_part) * closing

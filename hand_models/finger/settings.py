@@ -36,7 +36,8 @@ class FingerSettings:
     9,940 fingers on rough walls that come to rest nine took more than 400, and one more than
     900."""
     most_tension: float = 2.0 / 37.0
-    """Largest growth of the tension in an increment."""
+    most_lowering: float = 0.5 / 37.0
+    """Largest growth of the tension in an increment of closing, and fall in one of opening."""
     least_tension: float = 1e-4
     """Smallest growth of the tension where a contact changes."""
     first_stride: float = 0.06
@@ -75,6 +76,8 @@ class FingerSettings:
     damped_torque: float = 0.3
     """Largest difference between torques and their linearisation: to lengthen the stride, to
     stay on the path, and as a share of the torque that damping leaves."""
+    balanced_torque: float = 1e-3
+    """Largest torque that is left where a finger on its path counts as balanced."""
     balance: float = 1e-8
     late_balance: float = 5e-7
     """Torque that damping may leave at the end: in general, and on long paths."""

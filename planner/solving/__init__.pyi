@@ -13,7 +13,11 @@ from .palm_parts import (
     load_factors_without_palm_loads as load_factors_without_palm_loads,
 )
 from .robust_tensions import MaxRobust as MaxRobust
-from .solution import Infeasible as Infeasible, Verified as Verified
+from .solution import (
+    Infeasible as Infeasible,
+    Solution as Solution,
+    Verified as Verified,
+)
 from .solve import (
     KnownStance as KnownStance,
     StanceAnswer as StanceAnswer,

@@ -1,0 +1,275 @@
+"""One branch of a limb's inverse kinematics kept along a path of hand poses.
+
+The step to the next pose is Newton's with weighted least norm: joints that come near a limit move
+less (Chan and Dubey, *A weighted least-norm solution based scheme for avoiding joint limits for
+redundant joint manipulators*, IEEE Transactions on Robotics and Automation, 1995).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from hand_models.base import Array, InvalidInputError, Pose, turns_about
+from planner import deadline
+from planner.motion.settings import MOTION_SETTINGS
+from planner.robots import LimbBatch, Robot, damped_step, postures_near
+
+__all__ = ["BranchEndError", "branches", "follow_poses", "pose_between", "shift_postures"]
+
+
+class BranchEndError(InvalidInputError):
+    """Error of a hand that cannot follow its path with joint angles that change steadily.
+
+    Parameters
+    ----------
+    limb : str
+    share : float
+        Part of the path that was followed, from 0 to 1.
+    lacks : str
+        What keeps the limb from going on.
+
+    Attributes
+    ----------
+    limb, share, lacks
+        The parameters.
+    """
+
+    kind = "unreachable"
+
+    def __init__(self, limb: str, share: float, lacks: str) -> None:
+        super().__init__(
+            f"{limb} cannot follow its hand's path beyond {100.0 * share:.0f} % of it: {lacks}; "
+            "start from another posture, or choose another path"
+        )
+        self.limb, self.share, self.lacks = limb, share, lacks
+
+
+def pose_between(first: Pose, second: Pose, part: float) -> Pose:
+    """Return a pose between two: position on the straight line, along the shortest turn.
+
+    Parameters
+    ----------
+    first, second : Pose
+    part : float
+        Progress from 0 to 1.
+    """
+    turn = pin.log3(first.rotation.T @ second.rotation)
+    place = first.position + part * (second.position - first.position)
+    return Pose(place, first.rotation @ turns_about(part * turn))
+
+
+class _Limb:
+    """A limb's kinematics, by Pinocchio."""
+
+    def __init__(self, robot: Robot, limb: str) -> None:
+        self.limb, self.chain = limb, robot.chains[limb]
+        self._robot, self._q = robot, robot.configuration({})
+
+    def errors(self, angles: Array, target: Pose) -> tuple[Array, Array]:
+        """Return the twist in H to a pose in B, (6,), over the reach, and its Jacobian (6, n)."""
+        model, data, chain = self._robot.model, self._robot.data, self.chain
+        chain.turn(self._q, angles)
+        pin.computeJointJacobians(model, data, self._q)
+        there = self._robot.root @ target
+        off = pin.updateFramePlacement(model, data, chain.frame).actInv(
+            pin.SE3(there.rotation, there.position)
+        )
+        jacobian = pin.getFrameJacobian(model, data, chain.frame, pin.ReferenceFrame.LOCAL)
+        J = jacobian[:, chain.columns] @ chain.coupling
+        error = np.concatenate([off.translation, pin.log3(off.rotation)])
+        error[:3] /= chain.reach
+        J[:3] /= chain.reach
+        return error, J
+
+    def follow(self, start: Array, target: Pose) -> Array | None:
+        """Return the angles nearest to others that solve a pose; None if Newton's steps fail."""
+        chain, settings = self.chain, MOTION_SETTINGS
+        angles, weights = start.copy(), self._ease(start)
+        for _ in range(settings.newton_steps):
+            error, J = self.errors(angles, target)
+            if np.abs(error).max() <= settings.pose_error:
+                return angles
+            free = weights.copy()
+            for _ in range(len(chain.joints)):
+                eased = J * free
+                inner = eased @ J.T + 1e-12 * np.eye(6)
+                step = eased.T @ np.linalg.solve(inner, error)
+                moved = angles + step
+                # a joint that would leave its limits stays at the limit
+                over = ((moved < chain.lower) | (moved > chain.upper)) & (free > 0.0)
+                stuck = over & ((angles == chain.lower) | (angles == chain.upper))
+                if not stuck.any():
+                    break
+                free[stuck] = 0.0
+            angles = np.clip(moved, chain.lower, chain.upper)
+            if np.abs(angles - start).max() > settings.largest_step:
+                return None
+        return None
+
+    def _ease(self, angles: Array) -> Array:
+        """Return how easily each joint moves: 1 in the middle of its range, 0 at its limits."""
+        chain = self.chain
+        with np.errstate(invalid="ignore"):
+            room = np.minimum(angles - chain.lower, chain.upper - angles)
+            part = np.clip(2.0 * room / (chain.upper - chain.lower), 0.0, 1.0)
+        part = np.where(np.isfinite(part), part, 1.0)
+        return np.asarray(np.maximum(1.0 - (1.0 - part) ** 4, 1e-3))
+
+    def lacking(self, angles: Array, target: Pose) -> str:
+        """Say what keeps the limb from a pose, from the angles that it has."""
+        chain, (error, J) = self.chain, self.errors(angles, target)
+        within = MOTION_SETTINGS.at_limit
+        slope = error @ J
+        low = (angles - chain.lower < within) & (slope < 0.0)
+        high = (chain.upper - angles < within) & (slope > 0.0)
+        stopped = []
+        for i in np.flatnonzero(low | high).tolist():
+            limit = chain.lower[i] if low[i] else chain.upper[i]
+            unit = "m" if chain.sliding[i] else "rad"
+            stopped.append(f"{chain.joints[i]} is at its limit of {limit:.4g} {unit}")
+        size = np.linalg.svd(J, compute_uv=False)
+        if size[-1] < MOTION_SETTINGS.singular:
+            stopped.append("the limb is stretched or folded, where it cannot move every way")
+        if not stopped:
+            stopped.append(
+                f"a joint would turn by more than {MOTION_SETTINGS.largest_step:g} rad at once"
+            )
+        return ", and ".join(stopped)
+
+
+def follow_poses(robot: Robot, limb: str, start_angles: Array, poses: Sequence[Pose]) -> Array:
+    """Return joint angles that keep a limb's hand on a path, on one branch.
+
+    Parameters
+    ----------
+    robot : Robot
+    limb : str
+    start_angles : ndarray, shape (n,)
+        Angles from which the first pose is reached by a small motion [rad].
+    poses : sequence of Pose, length m
+        Poses of H in B. Between two of them the path is followed in steps so small that no joint
+        turns by more than `MotionSettings.largest_step`.
+
+    Returns
+    -------
+    ndarray, shape (m, n)
+        Joint angles within their limits that put H on each pose [rad].
+
+    Raises
+    ------
+    BranchEndError
+        If the branch ends; the error says where, and what is missing.
+    DeadlineError
+        If the deadline passes first.
+    """
+    one, found = _Limb(robot, limb), []
+    angles = np.asarray(start_angles, dtype=float)
+    before = robot.hand_poses({limb: angles})[limb]
+    for i, pose in enumerate(poses):
+        deadline.check("a limb had followed its hand's path")
+        done, step = 0.0, 1.0
+        while done < 1.0:
+            part = min(done + step, 1.0)
+            target = pose if part == 1.0 else pose_between(before, pose, part)
+            moved = one.follow(angles, target)
+            if moved is None:
+                step *= 0.5
+                if step < 0.5**MOTION_SETTINGS.finest:
+                    share = (i + done) / len(poses)
+                    raise BranchEndError(limb, share, one.lacking(angles, target))
+                continue
+            angles, done = moved, part
+            step *= 2.0
+        found.append(angles)
+        before = pose
+    return np.array(found).reshape(len(poses), -1)
+
+
+def shift_postures(
+    robot: Robot,
+    hands: Mapping[str, Pose],
+    bodies: Sequence[Pose],
+    start: Mapping[str, Array],
+) -> dict[str, Array]:
+    """Return joint angles of limbs whose hands stay where they are while the body moves.
+
+    Parameters
+    ----------
+    robot : Robot
+    hands : mapping of str to Pose
+        Pose of H in the world frame W, by limb.
+    bodies : sequence of Pose, length m
+        Poses of B in W, one after the other.
+    start : mapping of str to ndarray, shape (n,)
+        Joint angles before the first of them, by limb [rad].
+
+    Returns
+    -------
+    dict of str to ndarray, shape (m, n)
+        Joint angles at each pose of the body, by limb [rad].
+
+    Raises
+    ------
+    BranchEndError
+        If the branch of a limb ends.
+    DeadlineError
+        If the deadline passes first.
+    """
+    inverse = [body.inverse() for body in bodies]
+    return {
+        limb: follow_poses(robot, limb, start[limb], [body @ hand for body in inverse])
+        for limb, hand in hands.items()
+    }
+
+
+def branches(
+    robot: Robot, limb: str, pose: Pose, near: Array | None = None, count: int = 6
+) -> tuple[Array, ...]:
+    """Return joint angles of several kinds that put a limb's hand on a pose.
+
+    They are found from random postures whose hand is near the pose; two of them differ by more than
+    `MotionSettings.alike` in some joint. None may be found where there are some.
+
+    Parameters
+    ----------
+    robot : Robot
+    limb : str
+    pose : Pose
+        Pose of H in B.
+    near : ndarray, shape (n,), optional
+        Angles that the first ones are to be nearest to; the middle of the joints' ranges by
+        default.
+    count : int
+        Number of solutions at most.
+
+    Returns
+    -------
+    tuple of ndarray, shape (n,)
+        Joint angles within their limits, the nearest first [rad].
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline passes first.
+    """
+    batch = LimbBatch(robot, {limb: pose}, {}, np.zeros(3))
+    chain = robot.chains[limb]
+    middle = chain.rest if near is None else np.asarray(near, dtype=float)
+    angles = np.vstack([middle, postures_near(batch, 0, MOTION_SETTINGS.starts)])[:, None]
+    for _ in range(MOTION_SETTINGS.branch_steps):
+        deadline.check("postures with a hand on its hold were found")
+        errors, jacobians = batch.errors(angles)
+        left = np.abs(errors).max(axis=(1, 2)) > MOTION_SETTINGS.pose_error
+        if not left.any():
+            break
+        angles[left] = damped_step(batch, angles[left], errors[left], jacobians[left])
+    errors, _ = batch.errors(angles)
+    solved = angles[np.abs(errors).max(axis=(1, 2)) <= MOTION_SETTINGS.pose_error, 0]
+    found: list[Array] = []
+    for each in solved[np.abs(solved - middle).max(axis=1).argsort(kind="stable")]:
+        if all(np.abs(each - other).max() > MOTION_SETTINGS.alike for other in found):
+            found.append(each)
+    return tuple(found[:count])

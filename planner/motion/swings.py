@@ -1,0 +1,188 @@
+"""The swing of a hand from one hold to the next, as joint angles that are proven to be clear.
+
+The hand goes straight back from its old hold, along −z of H, then along a way in joint space, and
+straight on to the new hold, along z of H.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from hand_models.base import Array, InvalidInputError, Pose
+from planner.motion.branch import BranchEndError, follow_poses
+from planner.motion.collisions import CollisionScene, JointSpace, Nearest
+from planner.motion.ways import Clear, check_way, search_way
+from planner.robots import scene_number
+
+__all__ = ["NoWayError", "Swing", "swing"]
+
+
+class NoWayError(InvalidInputError):
+    """Error of a limb for which no clear way to its new hold was found.
+
+    Parameters
+    ----------
+    limb : str
+    where : str
+        Part of the swing, as a clause.
+    nearest : Nearest
+        What meets there.
+    margin : float
+        Distance that is needed [m].
+
+    Attributes
+    ----------
+    limb, where, nearest, margin
+        The parameters.
+    """
+
+    kind = "unreachable"
+
+    def __init__(self, limb: str, where: str, nearest: Nearest, margin: float) -> None:
+        super().__init__(
+            f"{limb} has no way to its new hold: {where}, {nearest}, and {1e3 * margin:.3g} mm "
+            "are needed; shift the body, or choose another hold"
+        )
+        self.limb, self.where, self.nearest, self.margin = limb, where, nearest, margin
+
+
+@dataclass(frozen=True, eq=False)
+class Swing:
+    """Joint angles of a limb on the way from one hold to the next.
+
+    Attributes
+    ----------
+    limb : str
+    path : ndarray, shape (m, n)
+        Joint angles at the corners of the way [rad]; between two of them joints turn in proportion.
+    retreat, approach : int
+        Index of the corner at which the hand has gone back from its old hold, and from which it
+        goes straight on to the new one.
+    nearest : Nearest
+        The least distance that was met between those two corners.
+    bound : float
+        Proven lower bound of all distances between them [m].
+    how : {'straight', 'searched'}
+        Whether the way between them is one straight line in joint space.
+    """
+
+    limb: str
+    path: Array
+    retreat: int
+    approach: int
+    nearest: Nearest
+    bound: float
+    how: Literal["straight", "searched"]
+
+
+def swing(
+    scene: CollisionScene,
+    body: Pose,
+    joints: Mapping[str, Array],
+    limb: str,
+    goals: Sequence[Array],
+    *,
+    stand_off: float | None = None,
+    margin: float | None = None,
+    seed: int = 0,
+) -> Swing:
+    """Find the swing of a limb's hand from its hold to the next one, while all else stays.
+
+    Parameters
+    ----------
+    scene : CollisionScene
+        The robot and all rock; both holds of the limb have it among their ``limbs``.
+    body : Pose
+        Pose of B in W.
+    joints : mapping of str to ndarray, shape (n,)
+        Joint angles of every limb at the start [rad].
+    limb : str
+        The limb that swings.
+    goals : sequence of ndarray, shape (n,)
+        Joint angles with the hand on its new hold, the best ones first [rad].
+    stand_off : float, optional
+        Distance of the hand from its holds in the swing [m]; that of ``parameters/scene.toml`` by
+        default.
+    margin : float, optional
+        Least distance of links and hands from each other and from rock [m]; that of
+        ``parameters/scene.toml`` by default.
+    seed : int
+        Seed of the search's random directions.
+
+    Raises
+    ------
+    NoWayError
+        If no clear way was found; the error says which link meets what.
+    BranchEndError
+        If the hand cannot go straight back from its hold, or onto the new one.
+    DeadlineError
+        If the deadline passes first.
+    """
+    robot, start = scene.robot, np.asarray(joints[limb], dtype=float)
+    stand_off = scene_number("motion", "stand_off") if stand_off is None else stand_off
+    margin = scene_number("motion", "margin") if margin is None else margin
+    others = [each for each in robot.limbs if each != limb]
+    held = JointSpace(scene, body, joints, (limb,), touching=robot.limbs)
+    free = JointSpace(scene, body, joints, (limb,), touching=others)
+    back = _straight(scene, limb, start, stand_off)
+    _require(limb, check_way(held, back, 0.0), "while it goes back from its hold", 0.0)
+    _require(limb, check_way(free, back[-1:], margin), "in front of its old hold", margin)
+    on, error = [], None
+    for goal in goals:
+        try:
+            found = _straight(scene, limb, np.asarray(goal, dtype=float), stand_off)[::-1]
+            held = JointSpace(scene, body, {**joints, limb: goal}, (limb,), touching=robot.limbs)
+            _require(limb, check_way(held, found, 0.0), "while it goes onto its hold", 0.0)
+            _require(limb, check_way(free, found[:1], margin), "in front of its new hold", margin)
+        except (BranchEndError, NoWayError) as one:
+            error = error or one
+            continue
+        on.append(found)
+    if not on:
+        raise error or InvalidInputError("at least one is needed", field="goals")
+    seen: list[Clear] = []
+    for found in on:
+        line = np.array([back[-1], found[0]])
+        seen.append(check_way(free, line, margin))
+        if seen[-1].clear:
+            return _joined(limb, back, line, found, seen[-1], "straight")
+    ends = np.array([found[0] for found in on])
+    for again in range(3):  # a way that is not proven to be clear is searched anew
+        way = search_way(free, back[-1], ends, margin, seed + again)
+        if way is None:
+            break
+        clear = check_way(free, way, margin)
+        if clear.clear:
+            which = int(np.abs(ends - way[-1]).max(axis=1).argmin())
+            return _joined(limb, back, way, on[which], clear, "searched")
+    raise NoWayError(limb, "on the straight way in joint space", seen[0].nearest, margin)
+
+
+def _straight(scene: CollisionScene, limb: str, angles: Array, stand_off: float) -> Array:
+    """Return joint angles, shape (m, n), with which a hand goes straight back from its hold."""
+    pose = scene.robot.hand_poses({limb: angles})[limb]
+    away = np.linspace(0.0, stand_off, 6)[1:, None] * -pose.rotation[:, 2]
+    poses = [Pose(pose.position + each, pose.rotation) for each in away]
+    return np.vstack([angles, follow_poses(scene.robot, limb, angles, poses)])
+
+
+def _require(limb: str, seen: Clear, where: str, margin: float) -> None:
+    if not seen.clear:
+        raise NoWayError(limb, where, seen.nearest, margin)
+
+
+def _joined(
+    limb: str,
+    back: Array,
+    way: Array,
+    on: Array,
+    seen: Clear,
+    how: Literal["straight", "searched"],
+) -> Swing:
+    path = np.vstack([back, way[1:], on[1:]])
+    retreat = len(back) - 1
+    return Swing(limb, path, retreat, retreat + len(way) - 1, seen.nearest, seen.bound, how)

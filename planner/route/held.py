@@ -1,0 +1,321 @@
+"""A robot held at one time of a climb: its posture, and verified loads of all hands on the rock."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from msgspec import structs
+
+from hand_models.base import Array, Pose, wrench_transport
+from hand_models.hand import FINGERS
+from planner.explanation import joint_name, limit_name
+from planner.prepare import Posture, PreparedStance, assemble, posture_at
+from planner.programs import CAP_SLACK
+from planner.question import HandOnHold, Question, Stance
+from planner.result import LimitName, LoadRecovery, PlanArrays
+from planner.robots import LinkTree
+from planner.route.climb import Route
+from planner.route.knots import HandKnot
+from planner.solving import Checks, Solution, Verified, answer_on
+from planner.verification import Check
+
+__all__ = ["Held", "MovingHand", "NoPlanError", "Posed", "hold_as_planned", "hold_with"]
+
+
+class NoPlanError(Exception):
+    """Error: the hands cannot hold the robot in a posture; the message says why."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MovingHand:
+    """A hand that opens, closes or is in the air, whose loads are given.
+
+    Attributes
+    ----------
+    limb : str
+    on_rock : bool
+        Whether it touches its hold.
+    tensions, winch_angles : ndarray, shape (4,)
+        Tension [N] and winch angle [rad] of each tendon.
+    wrench : ndarray, shape (6,)
+        Wrench on the rock, in H [N, N·m].
+    deviation : ndarray, shape (6,)
+        How far the wrench may be from the straight line from the state before, each component
+        [N, N·m].
+    utilisation : float
+        Largest load of its fingers over capacity.
+    """
+
+    limb: str
+    on_rock: bool
+    tensions: Array
+    winch_angles: Array
+    wrench: Array
+    deviation: Array
+    utilisation: float
+
+
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """A robot's posture in a climb, with its hands on the rock, and perhaps one that moves.
+
+    Attributes
+    ----------
+    route : Route
+        Load, limits and objective.
+    hands : tuple of HandOnHold
+        The hands that hold the robot.
+    body : Pose
+        Pose of the body frame B in W.
+    angles : mapping of str to ndarray, shape (n,)
+        Joint angles of every limb [rad].
+    moving : MovingHand or None
+        The hand that moves.
+    """
+
+    route: Route
+    hands: tuple[HandOnHold, ...]
+    body: Pose
+    angles: Mapping[str, Array]
+    moving: MovingHand | None = None
+
+    @cached_property
+    def _whole(self) -> Question:
+        """The question without a hand that moves."""
+        route, start = self.route, self.route.start
+        on_rock = {hand.limb for hand in self.hands}
+        caps = {limb: cap for limb, cap in route.limits.per_hand.items() if limb in on_rock}
+        stance = Stance(self.hands, self.body, start.gravity, start.robot, dict(self.angles))
+        limits = structs.replace(route.limits, per_hand=caps, tension_change=None)
+        return Question(stance, load=route.load, limits=limits, objective=route.objective)
+
+    @cached_property
+    def posture(self) -> Posture:
+        """Joint torques and weight of the robot at the joint angles."""
+        return posture_at(self._whole, self.angles)
+
+    @cached_property
+    def needed(self) -> Array:
+        """Wrench that the hands must supply that hold the robot, in B, shape (6,) [N, N·m]."""
+        weight, moving = self._whole.needed_wrench(self.posture.weights), self.moving
+        if moving is None or not moving.on_rock:
+            return weight
+        return np.asarray(
+            weight + wrench_transport(self.hand_poses[moving.limb]) @ moving.wrench
+        )
+
+    @cached_property
+    def prepared(self) -> PreparedStance:
+        """The stance of the hands that hold the robot, prepared for the solver."""
+        question, moving = self._whole, self.moving
+        if moving is not None and moving.on_rock:
+            question = replace(question, body_wrench=self.needed)
+        parts = assemble(question, self.posture, self.needed)
+        return PreparedStance(question, self.posture, *parts, self.needed)
+
+    @cached_property
+    def hand_poses(self) -> dict[str, Pose]:
+        """Pose of each limb's hand frame H in B: where its hand is held, or its joints put it."""
+        found, into_body = self.route.start.robot.hand_poses(self.angles), self.body.inverse()
+        return found | {hand.limb: into_body @ hand.pose for hand in self.hands}
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Verified loads of a posture.
+
+    Attributes
+    ----------
+    posed : Posed
+    prepared : PreparedStance
+        The stance of the hands that hold the robot.
+    loads : tuple of ndarray, shape (m,)
+        Loads y of each of these hands [N].
+    arrays : PlanArrays
+        Their numbers.
+    used : ndarray
+        Utilisation of each limit row of their sets, hand by hand.
+    solution : Solution or None
+        Of the solver, as a start for others.
+    """
+
+    posed: Posed
+    prepared: PreparedStance
+    loads: tuple[Array, ...]
+    arrays: PlanArrays
+    used: Array
+    solution: Solution | None = None
+
+    @cached_property
+    def wrenches(self) -> dict[str, Array]:
+        """Wrench of each hand on the rock, in its H, shape (6,) [N, N·m]; zero in the air."""
+        found = {limb: np.zeros(6) for limb in self.posed.route.start.robot.limbs}
+        found |= dict(zip(self.prepared.limbs, self.arrays.wrenches, strict=True))
+        if self.posed.moving is not None:
+            found[self.posed.moving.limb] = self.posed.moving.wrench
+        return found
+
+    @cached_property
+    def joint_torque(self) -> dict[str, Array]:
+        """Joint torques of every limb, shape (n,) [N·m]."""
+        where = self.prepared.where
+        assert where is not None
+        return {limb: own.torques(self.wrenches[limb]) for limb, own in where.joints.items()}
+
+    @cached_property
+    def idle(self) -> list[tuple[float, LimitName]]:
+        """Utilisation of the joints of limbs whose hand is not in the set of the stance."""
+        where, found = self.prepared.where, list[tuple[float, LimitName]]()
+        assert where is not None
+        for limb, own in where.idle(self.prepared.question.stance).items():
+            driven = own.driven
+            shares = np.abs(driven.torques(self.wrenches[limb])) / driven.limits
+            names = zip(driven.names, driven.sliding.tolist(), strict=True)
+            found += [
+                (share, joint_name(limb, *name))
+                for share, name in zip(shares.tolist(), names, strict=True)
+            ]
+        return found
+
+    @cached_property
+    def most_used(self) -> tuple[float, LimitName | None]:
+        """Largest utilisation of all limits, and the limit that has it."""
+        limits = [
+            (limb, row)
+            for limb, space in zip(self.prepared.limbs, self.prepared.hands.spaces, strict=True)
+            for row in space.rows[: len(space.s)]
+        ]
+        i = int(self.used.argmax())
+        found: list[tuple[float, LimitName | None]] = [
+            (max(float(self.used[i]), 0.0), limit_name(*limits[i])),
+            *self.idle,
+        ]
+        moving = self.posed.moving
+        if moving is not None and moving.on_rock:
+            found.append((moving.utilisation, LimitName(moving.limb, None, None, "shear")))
+        return max(found, key=lambda each: each[0])
+
+    @property
+    def utilisation(self) -> float:
+        """Largest utilisation of all limits."""
+        return self.most_used[0]
+
+    def hand_knots(self) -> tuple[HandKnot, ...]:
+        """Return the hands as a knot has them, in the order of the start stance."""
+        limbs, posed = self.prepared.limbs, self.posed
+        winches = self.arrays.drives[-1].reshape(-1, len(FINGERS))
+        tensions = self.arrays.tensions.reshape(-1, len(FINGERS))
+        poses = {hand.limb: hand.pose for hand in posed.hands}
+        found, moving = list[HandKnot](), posed.moving
+        for place in posed.route.start.hands:
+            limb = place.limb
+            if moving is not None and limb == moving.limb:
+                pose, on_rock = posed.body @ posed.hand_poses[limb], moving.on_rock
+                own = moving.tensions, moving.winch_angles
+            else:
+                h = limbs.index(limb)
+                pose, on_rock, own = poses[limb], True, (tensions[h], winches[h])
+            found.append(
+                HandKnot(
+                    limb=limb,
+                    pose=pose,
+                    on_rock=on_rock,
+                    tensions=own[0],
+                    winch_angles=own[1],
+                    wrench=self.wrenches[limb],
+                )
+            )
+        return tuple(found)
+
+
+def hold_as_planned(posed: Posed, near: Solution | None = None) -> Held:
+    """Return the verified plan of a posture.
+
+    Parameters
+    ----------
+    posed : Posed
+    near : Solution, optional
+        Solution of the same hands, as a warm start.
+
+    Raises
+    ------
+    NoPlanError
+        If there is no plan within the cap on the utilisation, or the moving limb's joints or
+        fingers are overloaded.
+    """
+    prepared = posed.prepared
+    checks = Checks.of(prepared)
+    found = answer_on(prepared, time.perf_counter(), checks, near)
+    answer = found.answer
+    if not isinstance(answer, Verified) or answer.utilisation > prepared.question.limits.utilisation + CAP_SLACK:
+        raise NoPlanError(found.reason or "no plan passes the checks")
+    held = Held(
+        posed, prepared, answer.solution.loads, answer.arrays, answer.used, answer.solution
+    )
+    return _checked(held)
+
+
+def hold_with(posed: Posed, loads: Sequence[Array]) -> Held:
+    """Return the verified loads of a posture that are given, shape (m,) for each hand [N].
+
+    Raises
+    ------
+    NoPlanError
+        If the loads do not pass the checks.
+    """
+    prepared = posed.prepared
+    recovery = LoadRecovery(prepared.batch, prepared.hands.spaces, prepared.hands.scaled)
+    arrays, used, _ = recovery.read(loads)
+    held = Held(posed, prepared, tuple(loads), arrays, used)
+    # the check knows of no wrench of a hand beside those of the stance
+    air = replace(posed, moving=None)
+    check = Check(prepared.question, prepared.batch, prepared.where)
+    alone = replace(held, posed=air)
+    wrong = check.problems(arrays, alone.utilisation, prepared.wrench)
+    if wrong:
+        raise NoPlanError(f"the loads do not pass the checks: {wrong[0]}")
+    return _checked(held)
+
+
+def _checked(held: Held) -> Held:
+    """Return loads whose moving limb passes its own check, and which are within the limits."""
+    moving, most = held.posed.moving, held.prepared.question.limits.utilisation
+    if moving is not None and moving.on_rock:
+        _check_moving(held, moving)
+    used, name = held.most_used
+    if not used <= most + CAP_SLACK:
+        from planner.explanation import constraint_words
+
+        what = "a limit" if name is None else f"{name.limb}: {constraint_words(name)}"
+        raise NoPlanError(f"{what} is used to {used:.3g} of its capacity")
+    return held
+
+
+def _check_moving(held: Held, moving: MovingHand) -> None:
+    """Recompute balance and torques with the moving hand's wrench, link by link from the URDF."""
+    posed, load = held.posed, held.posed.route.load
+    gravity = posed.body.rotation.T @ posed.route.start.gravity
+    acceleration = np.array([load.acceleration, load.angular_acceleration]) @ posed.body.rotation
+    own = LinkTree(posed.route.start.robot).hold_up(
+        posed.angles,
+        held.wrenches,
+        gravity,
+        acceleration.ravel(),
+        held=posed.hand_poses,
+        payloads=load.payloads,
+    )
+    said, found = held.joint_torque[moving.limb], own.torques[moving.limb]
+    if not np.abs(said - found).max() <= 1e-6 * max(1.0, float(np.abs(found).max())):
+        raise NoPlanError(f"the joint torques of {moving.limb} do not pass the check")
+    pushed = sum(
+        wrench_transport(pose) @ held.wrenches[limb] for limb, pose in posed.hand_poses.items()
+    )
+    if load.own:
+        off = own.body_wrench + own.payloads + pushed
+        size = float(np.linalg.norm(own.body_wrench))
+        if not float(np.linalg.norm(off)) <= 1e-6 * size:
+            raise NoPlanError(f"the balance is off by {float(np.linalg.norm(off)):.3g} N or N·m")
