@@ -115,6 +115,7 @@ from .robots import (
 )
 from .route import (
     Climb as Climb,
+    ClimbSettings as ClimbSettings,
     Failure as Failure,
     HandKnot as HandKnot,
     Knot as Knot,
@@ -127,6 +128,7 @@ from .route import (
     StageSurvival as StageSurvival,
     evaluate as evaluate,
     find_route_survival as find_route_survival,
+    plan_climb as plan_climb,
     stages as stages,
 )
 from .simulation import find_survival as find_survival

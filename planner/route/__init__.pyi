@@ -6,6 +6,7 @@ from .climb import (
     RouteStage as RouteStage,
     stages as stages,
 )
+from .climbing import plan_climb as plan_climb
 from .evaluation import evaluate as evaluate
 from .knots import (
     Climb as Climb,
@@ -14,6 +15,7 @@ from .knots import (
     Knot as Knot,
     KnotPhase as KnotPhase,
 )
+from .settings import ClimbSettings as ClimbSettings
 from .survival import (
     RouteShare as RouteShare,
     RouteSurvival as RouteSurvival,

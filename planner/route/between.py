@@ -121,10 +121,31 @@ class Passage:
             If they do not pass the checks.
         """
         posed = self.posed(t)
-        return hold_with(posed, np.split(self.loads(t, posed), self._ends))
+        return hold_with(posed, self.settled(t, posed))
 
-    def loads(self, t: float, posed: Posed) -> Array:
-        """Return loads of all hands, shape (M,), that balance an interpolated posture [N]."""
+    def slack(self) -> float:
+        """Return how far interpolated joints put hands from their holds in the middle [m]."""
+        if self.start.posed.body is self.end.posed.body:
+            return 0.0
+        posed = self.posed(0.5)
+        there = posed.route.start.robot.hand_poses(posed.angles)
+        off = [posed.body @ there[hand.limb] for hand in posed.hands]
+        pairs = zip(off, posed.hands, strict=True)
+        return max(float(np.linalg.norm(at.position - hand.pose.position)) for at, hand in pairs)
+
+    def settled(self, t: float, posed: Posed) -> list[Array]:
+        """Return loads of each hand, shape (m,), that balance a posture with tensions at t [N].
+
+        Parameters
+        ----------
+        t : float
+            Time from 0 to 1.
+        posed : Posed
+            The posture that is interpolated at that time, or one near it.
+        """
+        return np.split(self._loads(t, posed), self._ends)
+
+    def _loads(self, t: float, posed: Posed) -> Array:
         y = _mixed(np.concatenate(self.start.loads), np.concatenate(self.end.loads), t)
         ends = self._needed(self.start.posed), self._needed(self.end.posed)
         return np.asarray(y + self._settling @ (self._needed(posed) - _mixed(*ends, t)))
@@ -152,7 +173,7 @@ class Passage:
         peaks = _peak(*ends, d)[~changing] + e[~changing]
         most = max(most, float(peaks.max(initial=0.0)))
         if changing.any():
-            used = _used(middle, self.loads(0.5, middle))
+            used = _used(middle, self._loads(0.5, middle))
             most = max(most, float(_parabola(ends[0], used, ends[1])[changing].max()))
         return max(most, self._idle(middle))
 
@@ -245,7 +266,7 @@ class Passage:
         room = [used.max() + self.excess - used]
         room.append(_room(*(rows.most - rows.hard @ y for y in loads)))
         each = np.abs(np.concatenate([rows.used, rows.hard]))
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
             alone = np.where(each > 1e-12, np.concatenate(room)[:, None] / each, np.inf)
         # a reaction may change as far as the first row allows that it alone would break
         weight = np.where(rows.passive, np.minimum(alone.min(axis=0), 1e3), 0.0) ** 2

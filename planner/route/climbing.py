@@ -9,33 +9,34 @@ back from its hold, through the air and on to the next; it *closes* along its cl
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
+from msgspec import structs
 
 from hand_models.base import Array, InvalidInputError, Pose, UnsupportedError
-from hand_models.hand import SettledHand
-from hand_models.parameters import bundled_table
 from planner.motion import (
+    BranchEndError,
     CollisionScene,
+    NoWayError,
     branches,
-    pose_between,
     rocks_of,
     shift_postures,
     swing,
 )
-from planner.prepare import posture, settle_hand
-from planner.question import HandOnHold, Question
-from planner.robots import UnreachableError
+from planner.prepare import posture, settle_each
+from planner.programs import CAP_SLACK
+from planner.robots import UnreachableError, solve_limbs
 from planner.route.between import Passage
-from planner.route.climb import Move, Route, RouteStage, stages
+from planner.route.climb import Move, Route, RouteStage, in_route, stages
 from planner.route.evaluation import must_touch
 from planner.route.held import Held, MovingHand, NoPlanError, Posed, hold_as_planned, hold_with
-from planner.route.knots import Climb, Failure, HandKnot, Knot, KnotPhase
+from planner.route.knots import Climb, Failure, Knot, KnotPhase
 from planner.route.moving import at_closing, closing_states, in_air, opening_states
-from planner.route.settings import ClimbSettings
+from planner.route.settings import ClimbSettings, KnotNumbers
+from planner.solving import Solution
 
 __all__ = ["plan_climb"]
 
@@ -69,12 +70,12 @@ def plan_climb(
         If a wrist is not fixed, the body accelerates about an axis, or a move gives joint angles of
         a limb that stays.
     """
+    if route.start.joints is None:
+        route = replace(route, start=replace(route.start, joints="solve"))
     _refuse(route)
-    change = route.limits.tension_change
-    planner = _Planner(route, (settings or ClimbSettings()).complete(), math.inf if change is None else change)
-    failure = None
+    planner, failure = _Planner(route, (settings or ClimbSettings()).complete()), None
     try:
-        planner.start()
+        planner.begin()
         for number, move in enumerate(route.moves, start=1):
             planner.move(number, move)
             if progress is not None:
@@ -133,94 +134,236 @@ class _Planner:
     route : Route
     settings : ClimbSettings
         Rates, all of them given.
-    change : float
-        Largest change of a tension between neighbouring knots [N].
+
+    Attributes
+    ----------
+    knots : list of Knot
     """
 
-    def __init__(self, route: Route, settings: ClimbSettings, change: float) -> None:
-        self.route, self.settings, self.change = route, settings, change
+    _at: Held
+
+    def __init__(self, route: Route, settings: ClimbSettings) -> None:
         self.knots: list[Knot] = []
+        self._route, self._settings, self._numbers = route, settings, KnotNumbers.bundled()
         self._stages = _stages_of(route)
-        self._stage, self._move = 0, 0
+        self._scene = _scene_of(route)
+        self._stage = self._move = 0
         self._limb: str | None = None
         self._phase: KnotPhase = "start"
-        self._scene: CollisionScene | None = None
-        table = bundled_table("climb.toml", "planner.parameters")
-        self._excess = table.positive("knots", "excess")
-        self._floor = table.positive("knots", "excess_floor")
-        self._halvings = int(table.positive("knots", "halvings"))
+        self._near: Solution | None = None
 
-    @property
-    def at(self) -> Held:
-        """Where the climb has come to."""
-        return self._at
+    # Parts of a climb ---------------------------------------------------------------------------
 
-    def start(self) -> None:
+    def begin(self) -> None:
         """Plan the start stance."""
-        stance = self.route.start
-        if stance.joints is None:
-            stance = replace(stance, joints="solve")
-        with _Phase(self, "start"):
-            where = posture(replace(self._stages[0].question, stance=stance))
+        stance = self._route.start
+        with self._in("start"):
+            where = posture(self._stages[0].question)
             assert where is not None
-            posed = Posed(self.route, stance.hands, stance.body, where.angles)
-            self._at = hold_as_planned(posed)
+            posed = Posed(self._route, stance.hands, stance.body, where.angles)
+            self._at = self._plan(posed, stage=True)
         self._append(self._at, None, stage=True)
 
     def move(self, number: int, move: Move) -> None:
         """Plan one move."""
         self._move, self._limb = number, move.hand.limb
-        self._solution = self._at.solution
         if move.body is not None:
-            with _Phase(self, "shift"):
+            with self._in("shift"):
                 self._shift(move.body)
-        with _Phase(self, "unload"):
-            states = self._unload()
-        with _Phase(self, "open"):
-            self._open(states)
-        with _Phase(self, "swing"):
+        with self._in("unload"):
+            states = self._unload(move.hand.limb)
+        with self._in("open"):
+            self._follow(states[1:])
+        with self._in("swing"):
             self._swing(move)
-        with _Phase(self, "close"):
-            self._close(move.hand)
-        with _Phase(self, "load"):
-            self._load(move.hand)
-
-    # Parts of a move ----------------------------------------------------------------------------
+        with self._in("close"):
+            whole, states = self._arrived(move.hand)
+            self._follow(states)
+        with self._in("load"):
+            self._load(whole, move.hand.limb)
 
     def _shift(self, goal: Pose) -> None:
         """Shift the body on all hands."""
-        first = self._at.posed
-        hands = {hand.limb: hand.pose for hand in first.hands}
-        count = 4
-        bodies = [pose_between(first.body, goal, k / count) for k in range(1, count)] + [goal]
-        robot = self.route.start.robot
-        found = shift_postures(robot, hands, bodies, first.angles)
-        for k, body in enumerate(bodies):
-            angles = {**first.angles, **{limb: each[k] for limb, each in found.items()}}
-            self._go(self._plan(replace(first, body=body, angles=angles)), stage=k == count - 1)
+        self._go(self._plan(self._shifted(self._at.posed, goal), stage=True), stage=True)
 
-    def _unload(self) -> list[MovingHand]:
+    def _unload(self, limb: str) -> list[MovingHand]:
         """Take the load off the leaving hand; return its states while it opens."""
-        held, limb = self._at, self._limb
-        assert limb is not None
+        held = self._at
         h = held.prepared.limbs.index(limb)
         settled, space = held.prepared.batch.hands[h], held.prepared.hands.spaces[h]
         states = opening_states(limb, settled, space)
         others = tuple(hand for hand in held.posed.hands if hand.limb != limb)
-        self._solution = None
+        self._near = None
         alone = self._plan(replace(held.posed, hands=others, moving=states[0]))
         loads = [*alone.loads[:h], at_closing(settled, space), *alone.loads[h:]]
-        self._go(hold_with(replace(held.posed, moving=None), loads))
+        self._go(hold_with(held.posed, loads))
         self._at = alone
         return states
 
-    def _open(self, states: Sequence[MovingHand]) -> None:
-        """Let the leaving hand open."""
-        self._follow(states)
+    def _follow(self, states: Sequence[MovingHand]) -> None:
+        """Follow the states of a hand that opens or closes."""
+        k = 0
+        while k < len(states):
+            state = states[k]
+            after = states[k + 1] if k + 1 < len(states) else None
+            if after is None or np.abs(after.tensions - state.tensions).max() > 1e-6:
+                self._go(self._plan(replace(self._at.posed, moving=state)))
+                k += 1
+                continue
+            # spines let go or catch at one tension: all others keep theirs
+            middle = replace(state, wrench=0.5 * (state.wrench + after.wrench))
+            held = self._plan(replace(self._at.posed, moving=middle))
+            for each in (state, after):
+                posed = replace(held.posed, moving=each)
+                self._go(hold_with(posed, Passage(held, held).settled(0.0, posed)))
+            k += 2
 
-    def _close(self, place: HandOnHold) -> None:
-        """Close the hand on its new hold."""
-        stance = replace(self.route.start, hands=(place,), joints=None)
-        settled = settle_hand(place, stance)
-        space = self._space_of(place)
-        self._follow(closing_states(place.limb, settled, space))
+    def _swing(self, move: Move) -> None:
+        """Swing the hand from its old hold to the new one."""
+        posed, limb = self._at.posed, move.hand.limb
+        robot, target = self._route.start.robot, posed.body.inverse() @ move.hand.pose
+        given = None if isinstance(move.joints, str) else move.joints.get(limb)
+        if isinstance(given, np.ndarray):
+            goals: Sequence[Array] = [given]
+        else:
+            goals = branches(robot, limb, target, posed.angles[limb])
+        if not goals:
+            solve_limbs(robot, {limb: target}, {}, np.zeros(3))
+            raise NoPlanError(f"no joint angles were found for {limb} on its new hold")
+        found = swing(self._scene, posed.body, posed.angles, limb, goals)
+        assert posed.moving is not None
+        air = in_air(posed.moving)
+        for k, angles in enumerate(found.path[1:], start=1):
+            # on the first way from the rock its wrench goes, somehow
+            moving = replace(air, deviation=np.abs(posed.moving.wrench)) if k == 1 else air
+            at = replace(self._at.posed, angles={**posed.angles, limb: angles}, moving=moving)
+            self._go(self._plan(at, stage=k == found.retreat), stage=k == found.retreat)
+
+    def _arrived(self, place: HandOnHold) -> tuple[Posed, list[MovingHand]]:
+        """Return the posture on the new hold, with all hands, and the states of the closing hand."""
+        posed, by_limb = self._at.posed, {hand.limb: hand for hand in self._at.posed.hands}
+        by_limb[place.limb] = place
+        order = [hand.limb for hand in self._route.start.hands]
+        whole = replace(posed, hands=tuple(by_limb[limb] for limb in order), moving=None)
+        prepared, h = whole.prepared, order.index(place.limb)
+        states = closing_states(place.limb, prepared.batch.hands[h], prepared.hands.spaces[h])
+        states[0] = replace(states[0], deviation=np.abs(states[0].wrench))
+        return whole, states
+
+    def _load(self, whole: Posed, limb: str) -> None:
+        """Load the hand on its new hold."""
+        h = whole.prepared.limbs.index(limb)
+        settled, space = whole.prepared.batch.hands[h], whole.prepared.hands.spaces[h]
+        alone = self._at.loads
+        self._at = hold_with(whole, [*alone[:h], at_closing(settled, space), *alone[h:]])
+        self._near = None
+        self._go(self._plan(whole, stage=True), stage=True)
+
+    # Knots --------------------------------------------------------------------------------------
+
+    @contextmanager
+    def _in(self, phase: KnotPhase) -> Iterator[None]:
+        """Plan a part of a move; what stands in its way ends the climb."""
+        self._phase = phase
+        try:
+            yield
+        except (NoPlanError, UnreachableError, BranchEndError, NoWayError) as error:
+            failure = Failure(self._move, phase, self._limb, str(error))
+            raise _BlockedError(failure) from error
+
+    def _plan(self, posed: Posed, *, stage: bool = False) -> Held:
+        """Return the plan of a posture; between stages palms press, so that they can settle."""
+        held = None
+        if not stage:
+            try:
+                held = hold_as_planned(posed, self._near, self._numbers.press)
+            except NoPlanError:
+                pass  # palms cannot press so much
+        held = held or hold_as_planned(posed, self._near)
+        self._near = held.solution
+        return held
+
+    def _shifted(self, posed: Posed, body: Pose) -> Posed:
+        """Return a posture with the body elsewhere and all hands where they are."""
+        robot, hands = self._route.start.robot, {hand.limb: hand.pose for hand in posed.hands}
+        found = shift_postures(robot, hands, [body], posed.angles)
+        angles = {**posed.angles, **{limb: each[-1] for limb, each in found.items()}}
+        return replace(posed, body=body, angles=angles)
+
+    def _go(self, end: Held, *, stage: bool = False, halvings: int | None = None) -> None:
+        """Append knots on the way to where the robot is held next."""
+        left = self._numbers.halvings if halvings is None else halvings
+        start, numbers = self._at, self._numbers
+        passage = Passage(start, end, numbers.excess)
+        bound, top = passage.bound(), max(start.utilisation, end.utilisation)
+        near = bound <= (1.0 + numbers.excess) * top + numbers.excess_floor
+        if not passage.still and left and not (near and passage.slack() <= numbers.slack):
+            middle = passage.posed(0.5)
+            if middle.body is not start.posed.body:
+                middle = self._shifted(start.posed, middle.body)
+            self._go(self._plan(middle), halvings=left - 1)
+            self._go(end, stage=stage, halvings=left - 1)
+            return
+        if not bound <= self._route.limits.utilisation + CAP_SLACK:
+            raise NoPlanError(
+                "between two knots passive reactions do not balance the way of the centre of mass"
+                if math.isinf(bound)
+                else f"between two knots the utilisation may be {bound:.3g}"
+            )
+        change = max(
+            float(np.abs(now.tensions - before.tensions).max())
+            for now, before in zip(end.hand_knots(), start.hand_knots(), strict=True)
+        )
+        most = self._route.limits.tension_change
+        pieces = 1 if most is None else math.ceil(change / most - 1e-9)
+        for k in range(1, pieces):
+            self._append(passage.hold(k / pieces), bound)
+        self._append(end, bound, stage=stage)
+        self._at = end
+
+    def _append(self, held: Held, bound: float | None, *, stage: bool = False) -> None:
+        """Append a knot."""
+        used, limiting = held.most_used
+        knot = Knot(
+            index=len(self.knots),
+            move=self._move,
+            phase=self._phase,
+            limb=self._limb,
+            stage=self._stage if stage else None,
+            time=0.0,
+            body=held.posed.body,
+            joints=held.posed.angles,
+            joint_torque=held.joint_torque,
+            hands=held.hand_knots(),
+            utilisation=used,
+            bound=bound,
+            limiting=limiting,
+            verified=True,
+        )
+        if self.knots:
+            before = self.knots[-1]
+            time = before.time + self._settings.duration(before, knot, self._route.start.robot)
+            knot = replace(knot, time=time)
+        self.knots.append(knot)
+        self._stage += stage
+
+
+def _stages_of(route: Route) -> tuple[RouteStage, ...]:
+    """Return the stages of a route, whose fields are checked; moves must end on rock."""
+    found = tuple(stages(replace(route, limits=structs.replace(route.limits, tension_change=None))))
+    for stage in found:
+        if stage.phase == "place":
+            try:
+                must_touch(stage)
+            except InvalidInputError as error:
+                raise in_route(error, stage.paths) from None
+    return found
+
+
+def _scene_of(route: Route) -> CollisionScene:
+    """Return the robot with all rock of a climb."""
+    robot = route.start.robot
+    hands = [*route.start.hands, *(move.hand for move in route.moves)]
+    settled = settle_each(robot.hand, hands)
+    closed = [each for each in settled if not isinstance(each, InvalidInputError)]
+    return CollisionScene(robot, rocks_of(zip(hands, closed, strict=True)))

@@ -16,7 +16,7 @@ from planner.route.climb import OutOfReach, Route, RouteResult, RouteStage, in_r
 from planner.route.knots import Climb
 from planner.solving import plan
 
-__all__ = ["evaluate"]
+__all__ = ["evaluate", "must_touch"]
 
 
 def evaluate(
@@ -114,7 +114,7 @@ def _planning(todo: Sequence[RouteStage]) -> Callable[[int], Answer]:
 def _plan_stage(stage: RouteStage) -> Answer:
     try:
         if stage.phase == "place":
-            _must_touch(stage)
+            must_touch(stage)
         return plan(stage.question)
     except UnreachableError as error:
         return OutOfReach(error.message)
@@ -122,7 +122,7 @@ def _plan_stage(stage: RouteStage) -> Answer:
         return in_route(error, stage.paths)
 
 
-def _must_touch(stage: RouteStage) -> None:
+def must_touch(stage: RouteStage) -> None:
     """Refuse a move that ends in the air."""
     stance = stage.question.stance
     i = next(i for i, hand in enumerate(stance.hands) if hand.limb == stage.limb)

@@ -14,7 +14,7 @@ from hand_models.base import Array, Pose, wrench_transport
 from hand_models.hand import FINGERS
 from planner.explanation import joint_name, limit_name
 from planner.prepare import Posture, PreparedStance, assemble, posture_at
-from planner.programs import CAP_SLACK
+from planner.programs import CAP_SLACK, LOAD_UNIT
 from planner.question import HandOnHold, Question, Stance
 from planner.result import LimitName, LoadRecovery, PlanArrays
 from planner.robots import LinkTree
@@ -232,7 +232,7 @@ class Held:
         return tuple(found)
 
 
-def hold_as_planned(posed: Posed, near: Solution | None = None) -> Held:
+def hold_as_planned(posed: Posed, near: Solution | None = None, press: float = 0.0) -> Held:
     """Return the verified plan of a posture.
 
     Parameters
@@ -240,6 +240,8 @@ def hold_as_planned(posed: Posed, near: Solution | None = None) -> Held:
     posed : Posed
     near : Solution, optional
         Solution of the same hands, as a warm start.
+    press : float, optional
+        Force with which palms press at least [N].
 
     Raises
     ------
@@ -249,7 +251,8 @@ def hold_as_planned(posed: Posed, near: Solution | None = None) -> Held:
     """
     prepared = posed.prepared
     checks = Checks.of(prepared)
-    found = answer_on(prepared, time.perf_counter(), checks, near)
+    asked = _pressing(prepared, press) if press > 0.0 else prepared
+    found = answer_on(asked, time.perf_counter(), checks, near, prove=press == 0.0)
     answer = found.answer
     if not isinstance(answer, Verified) or answer.utilisation > prepared.question.limits.utilisation + CAP_SLACK:
         raise NoPlanError(found.reason or "no plan passes the checks")
@@ -257,6 +260,18 @@ def hold_as_planned(posed: Posed, near: Solution | None = None) -> Held:
         posed, prepared, answer.solution.loads, answer.arrays, answer.used, answer.solution
     )
     return _checked(held)
+
+
+def _pressing(prepared: PreparedStance, press: float) -> PreparedStance:
+    """Return a stance whose palms press on the rock at least with a force [N]."""
+    spaces, scaled, hands = [], [], prepared.hands
+    for space, rows in zip(hands.spaces, hands.scaled, strict=True):
+        least = press * np.array(
+            [row.limit == "palm_pressing_reversed" for row in space.rows[len(space.s) :]]
+        )
+        spaces.append(replace(space, h=space.h - least))
+        scaled.append(rows._replace(h=rows.h - least / LOAD_UNIT))
+    return replace(prepared, hands=hands.with_sets(spaces, scaled=tuple(scaled)))
 
 
 def hold_with(posed: Posed, loads: Sequence[Array]) -> Held:
