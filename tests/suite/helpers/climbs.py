@@ -1,133 +1,77 @@
-"""A climb of two moves with joints, and knots made by hand of the plans of its stages."""
+"""A climb of two moves on a slab, with joints, and one that fails in the middle of a move."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import msgspec
 import numpy as np
+from msgspec.structs import replace
 
-from hand_models.base import Pose
-from planner import Climb, HandKnot, Knot, Plan, RouteResult, RouteStage, evaluate
+from planner import Climb, RouteResult, evaluate, plan_climb
 from service.answering import route_of
 from service.commands.stances import read_route
-from service.requests import RouteRequest
+from service.requests import Pose, RouteRequest
 
 
 class Climbed(NamedTuple):
-    """A route as it is asked for, its stages' plans, and knots of them."""
+    """A route as it is asked for, its knots, and its stages' plans at their joint angles."""
 
     request: RouteRequest
-    result: RouteResult
     climb: Climb
+    result: RouteResult
 
 
 def two_moves() -> RouteRequest:
-    """Return a route: one hand moves, then the body shifts, and another hand moves."""
+    """Return a route: one hand moves, then the body shifts, and the hand moves on."""
     bundled = read_route("six-moves")
-    start = msgspec.structs.replace(bundled.stance, joints="solve")
-    move = msgspec.convert(msgspec.to_builtins(bundled.moves[2]), type(bundled.moves[2]))
-    hand = next(each for each in start.hands if each.limb == "front_right")
-    second = msgspec.structs.replace(
-        move, pose=_raised(hand.pose, 0.03), hold=hand.hold, body=_raised(start.body, 0.01)
+    start = replace(bundled.stance, joints="solve")
+    first = _raised(bundled, "front_left", 0.1)
+    second = replace(_raised(bundled, "front_left", 0.15), body=_along(start.body, 0.02))
+    return replace(bundled, name="two moves", stance=start, moves=[first, second])
+
+
+def blocked() -> RouteRequest:
+    """Return a route of one move that succeeds, and one in whose way a link is in rock."""
+    found = two_moves()
+    return replace(
+        found, name="blocked", moves=[found.moves[0], _raised(found, "front_right", 0.1)]
     )
-    return msgspec.structs.replace(bundled, stance=start, moves=[bundled.moves[0], second])
 
 
-def _raised(pose, by: float):
-    x, y, z = pose.position
-    return msgspec.structs.replace(pose, position=(x, y, z + by))
+def _raised(route: RouteRequest, limb: str, by: float) -> Any:
+    """Return the move of a hand up from where it is at the start [m]."""
+    hand = next(each for each in route.stance.hands if each.limb == limb)
+    return replace(
+        route.moves[0],
+        limb=limb,
+        pose=_along(hand.pose, by),
+        hold=hand.hold,
+        surface=hand.surface,
+        grasp=hand.grasp,
+    )
+
+
+def _along(pose: Pose, by: float) -> Pose:
+    """Return a pose that is moved up the slab [m]."""
+    up = np.array([0.155291, 0.0, 0.579555]) / np.hypot(0.155291, 0.579555)
+    x, y, z = (np.array(pose.position) + by * up).tolist()
+    return replace(pose, position=(x, y, z))
 
 
 @cache
 def climbed() -> Climbed:
-    """Plan the stages of the two moves, with a knot at each and one in the middle of each swing."""
-    request = two_moves()
+    """Return the two moves, planned."""
+    return _planned(two_moves())
+
+
+@cache
+def failed() -> Climbed:
+    """Return the climb that fails, as far as it comes."""
+    return _planned(blocked())
+
+
+def _planned(request: RouteRequest) -> Climbed:
     route = route_of(request)
-    result = evaluate(route)
-    knots: list[Knot] = []
-    for stage, plan in zip(result.stages, result.plans, strict=True):
-        assert isinstance(plan, Plan)
-        knot = _knot(stage, plan, knots)
-        if stage.phase == "place":
-            knots.append(_swing(knots[-1], knot))
-            knot = replace(knot, index=knot.index + 1)
-        knots.append(knot)
-    return Climbed(request, result, Climb(route, tuple(knots)))
-
-
-def _knot(stage: RouteStage, plan: Plan, before: list[Knot]) -> Knot:
-    phase = {"start": "start", "shift": "shift", "lift": "open", "place": "load"}[stage.phase]
-    return Knot(
-        index=len(before),
-        move=stage.move,
-        phase=phase,
-        limb=stage.limb,
-        stage=stage.index,
-        time=2.0 * stage.index,
-        body=stage.question.stance.body,
-        joints=plan.joints,
-        joint_torque=plan.joint_torque,
-        hands=tuple(_hands(stage, plan, before)),
-        utilisation=plan.utilisation,
-        bound=max(plan.utilisation, before[-1].utilisation) if before else None,
-        limiting=plan.limiting,
-        verified=plan.verified,
-    )
-
-
-def _hands(stage: RouteStage, plan: Plan, before: list[Knot]):
-    poses = {hand.limb: hand.pose for hand in stage.question.stance.hands}
-    loads = {hand.limb: hand for hand in plan.hands}
-    last = {hand.limb: hand for hand in before[-1].hands} if before else {}
-    for limb in last or poses:
-        if limb in loads:
-            hand = loads[limb]
-            yield HandKnot(
-                limb=limb,
-                pose=poses[limb],
-                on_rock=True,
-                tensions=hand.tensions,
-                winch_angles=hand.drives[2],
-                wrench=hand.wrench,
-            )
-        else:
-            off = last[limb].pose.apply([0.0, 0.0, -0.05])
-            pose = Pose(off, last[limb].pose.rotation)
-            yield HandKnot(
-                limb=limb,
-                pose=pose,
-                on_rock=False,
-                tensions=np.zeros(4),
-                winch_angles=np.zeros(4),
-                wrench=np.zeros(6),
-            )
-
-
-def _swing(start: Knot, end: Knot) -> Knot:
-    """Return a knot between two with the tensions of the first, the hand away from the rock."""
-    hands = tuple(
-        hand
-        if hand.on_rock
-        else replace(
-            hand,
-            pose=Pose(
-                (hand.pose.position + other.pose.position) / 2.0 - [0.05, 0.0, 0.0],
-                hand.pose.rotation,
-            ),
-        )
-        for hand, other in zip(start.hands, end.hands, strict=True)
-    )
-    joints = {limb: (start.joints[limb] + end.joints[limb]) / 2.0 for limb in start.joints}
-    return replace(
-        start,
-        index=start.index + 1,
-        phase="swing",
-        stage=None,
-        time=(start.time + end.time) / 2.0,
-        joints=joints,
-        hands=hands,
-        bound=start.utilisation,
-    )
+    climb = plan_climb(route)
+    return Climbed(request, climb, evaluate(route, climb=climb))
