@@ -67,6 +67,7 @@ class _Limb:
     def __init__(self, robot: Robot, limb: str) -> None:
         self.limb, self.chain = limb, robot.chains[limb]
         self._robot, self._q = robot, robot.configuration({})
+        self._still = Pose.identity()
 
     def errors(self, angles: Array, target: Pose) -> tuple[Array, Array]:
         """Return the twist in H to a pose in B, (6,), over the reach, and its Jacobian (6, n)."""
@@ -85,38 +86,57 @@ class _Limb:
         return error, J
 
     def follow(self, start: Array, target: Pose) -> Array | None:
-        """Return the angles nearest to others that solve a pose; None if Newton's steps fail."""
+        """Return angles near others that solve a pose; None if none are near enough."""
         chain, settings = self.chain, MOTION_SETTINGS
-        angles, weights = start.copy(), self._ease(start)
+        angles, drift = start, None
         for _ in range(settings.newton_steps):
             error, J = self.errors(angles, target)
             if np.abs(error).max() <= settings.pose_error:
                 return angles
-            free = weights.copy()
-            for _ in range(len(chain.joints)):
-                eased = J * free
-                inner = eased @ J.T + 1e-12 * np.eye(6)
-                step = eased.T @ np.linalg.solve(inner, error)
-                moved = angles + step
-                # a joint that would leave its limits stays at the limit
-                over = ((moved < chain.lower) | (moved > chain.upper)) & (free > 0.0)
-                stuck = over & ((angles == chain.lower) | (angles == chain.upper))
-                if not stuck.any():
+            if drift is None:
+                drift = self._drift(start, J)
+            free = np.ones(len(angles))
+            for _ in range(len(angles)):
+                step = free * (J.T @ np.linalg.solve((J * free) @ J.T + 1e-12 * np.eye(6), error))
+                # a joint at a limit that it would leave stays there
+                stuck = (angles <= chain.lower) & (step < 0.0) | (angles >= chain.upper) & (
+                    step > 0.0
+                )
+                if not (stuck & (free > 0.0)).any():
                     break
                 free[stuck] = 0.0
-            angles = np.clip(moved, chain.lower, chain.upper)
+            # at first, as much as the joints turn anyway
+            step = step + drift * np.abs(step).max()
+            drift *= 0.0
+            angles = np.clip(angles + step, chain.lower, chain.upper)
             if np.abs(angles - start).max() > settings.largest_step:
                 return None
         return None
 
-    def _ease(self, angles: Array) -> Array:
-        """Return how easily each joint moves: 1 in the middle of its range, 0 at its limits."""
-        chain = self.chain
-        with np.errstate(invalid="ignore"):
-            room = np.minimum(angles - chain.lower, chain.upper - angles)
-            part = np.clip(2.0 * room / (chain.upper - chain.lower), 0.0, 1.0)
-        part = np.where(np.isfinite(part), part, 1.0)
-        return np.asarray(np.maximum(1.0 - (1.0 - part) ** 4, 1e-3))
+    def _drift(self, angles: Array, J: Array) -> Array:
+        """Return the motion that leaves the hand and eases the limb, (n,), at most 1 a joint.
+
+        It goes down the slope of −½ log det J Jᵀ − Σ log (room of a joint in its range), in
+        directions that leave the hand where it is, so that a redundant limb keeps off its limits
+        and off postures in which it cannot move every way.
+        """
+        chain, drift = self.chain, np.zeros(len(angles))
+        if len(angles) <= len(J):
+            return drift
+        bounded = np.isfinite(chain.upper - chain.lower)
+        low, high = (angles - chain.lower)[bounded], (chain.upper - angles)[bounded]
+        slope, h = np.zeros(len(angles)), 1e-4  # [rad] of the difference quotient
+        slope[bounded] = 1.0 / np.maximum(high, h) - 1.0 / np.maximum(low, h)
+        for along in np.linalg.svd(J)[2][len(J) :]:
+            ends = [self._mobility(angles + side * h * along) for side in (-1.0, 1.0)]
+            rise = slope @ along - (ends[1] - ends[0]) / (2.0 * h)
+            drift -= along * np.clip(rise, -1.0, 1.0)
+        return drift
+
+    def _mobility(self, angles: Array) -> float:
+        """Return ½ log det J Jᵀ: the logarithm of how well the hand moves every way [1]."""
+        _, J = self.errors(angles, self._still)
+        return 0.5 * float(np.linalg.slogdet(J @ J.T + 1e-12 * np.eye(6))[1])
 
     def lacking(self, angles: Array, target: Pose) -> str:
         """Say what keeps the limb from a pose, from the angles that it has."""

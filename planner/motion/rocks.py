@@ -11,7 +11,6 @@ import numpy as np
 from hand_models.base import Array, BoundedStore, Pose
 from hand_models.hand import SettledHand
 from hand_models.rock import Hold, Mesh, TriangleCells
-from planner.motion.settings import MOTION_SETTINGS
 from planner.question import HandOnHold
 from planner.scene import SCENE_SETTINGS, smooth_depths
 
@@ -62,22 +61,23 @@ def rocks_of(hands: Iterable[tuple[HandOnHold, SettledHand]]) -> tuple[Rock, ...
     return tuple(found)
 
 
-def rock_distances(hold: Hold, points: Array) -> Array:
+def rock_distances(hold: Hold, points: Array, most: float) -> Array:
     """Return how far points are from a hold, shape (n,) [m]; negative inside.
 
-    It is exact, but a lower bound for an ellipsoid. From rock of triangles it is measured up to
-    `MOTION_SETTINGS.farthest`; farther points have that distance.
+    It is exact, but a lower bound for an ellipsoid.
 
     Parameters
     ----------
     hold : Hold
     points : ndarray, shape (n, 3)
         Points in the hold's frame [m].
+    most : float
+        Distance up to which it is measured from triangles [m]; farther points have this one.
     """
     if hold.swept is not None:
         return np.asarray(-smooth_depths([hold.swept], points[None])[0])
     cells = hold.cells if isinstance(hold, Mesh) else CELLS.get(hold, partial(_cells, hold))
-    return cells.distances(points, MOTION_SETTINGS.farthest)
+    return cells.distances(points, most)
 
 
 def _cells(hold: Hold) -> TriangleCells:

@@ -16,7 +16,7 @@ from hand_models.base import Array, InvalidInputError, Pose
 from planner.motion.branch import BranchEndError, follow_poses
 from planner.motion.collisions import CollisionScene, JointSpace, Nearest
 from planner.motion.ways import Clear, check_way, search_way
-from planner.robots import scene_number
+from planner.robots import Robot, scene_number
 
 __all__ = ["NoWayError", "Swing", "swing"]
 
@@ -126,48 +126,48 @@ def swing(
     stand_off = scene_number("motion", "stand_off") if stand_off is None else stand_off
     margin = scene_number("motion", "margin") if margin is None else margin
     others = [each for each in robot.limbs if each != limb]
-    held = JointSpace(scene, body, joints, (limb,), touching=robot.limbs)
-    free = JointSpace(scene, body, joints, (limb,), touching=others)
-    back = _straight(scene, limb, start, stand_off)
-    _require(limb, check_way(held, back, 0.0), "while it goes back from its hold", 0.0)
-    _require(limb, check_way(free, back[-1:], margin), "in front of its old hold", margin)
-    on, error = [], None
+    free = JointSpace(scene, [body], joints, (limb,), touching=others)
+
+    def leaving(angles: Array, which: str) -> Array:
+        """Return joint angles, shape (m, n), with which the hand goes straight back from a hold."""
+        held = JointSpace(scene, [body], {**joints, limb: angles}, (limb,), touching=robot.limbs)
+        way = _straight(robot, limb, angles, stand_off)
+        _require(limb, check_way(held, way, 0.0), f"beside its {which} hold", 0.0)
+        _require(limb, check_way(free, way[-1:], margin), f"in front of its {which} hold", margin)
+        return way
+
+    back = leaving(start, "old")
+    onto: list[Array] = []
+    refused: list[BranchEndError | NoWayError] = []
     for goal in goals:
         try:
-            found = _straight(scene, limb, np.asarray(goal, dtype=float), stand_off)[::-1]
-            held = JointSpace(scene, body, {**joints, limb: goal}, (limb,), touching=robot.limbs)
-            _require(limb, check_way(held, found, 0.0), "while it goes onto its hold", 0.0)
-            _require(limb, check_way(free, found[:1], margin), "in front of its new hold", margin)
-        except (BranchEndError, NoWayError) as one:
-            error = error or one
+            onto.append(leaving(np.asarray(goal, dtype=float), "new")[::-1])
+        except (BranchEndError, NoWayError) as error:
+            refused.append(error)
             continue
-        on.append(found)
-    if not on:
-        raise error or InvalidInputError("at least one is needed", field="goals")
-    seen: list[Clear] = []
-    for found in on:
-        line = np.array([back[-1], found[0]])
-        seen.append(check_way(free, line, margin))
-        if seen[-1].clear:
-            return _joined(limb, back, line, found, seen[-1], "straight")
-    ends = np.array([found[0] for found in on])
-    for again in range(3):  # a way that is not proven to be clear is searched anew
-        way = search_way(free, back[-1], ends, margin, seed + again)
-        if way is None:
-            break
-        clear = check_way(free, way, margin)
-        if clear.clear:
+        line = np.array([back[-1], onto[-1][0]])
+        seen = check_way(free, line, margin)
+        if seen.clear:
+            return _joined(limb, back, line, onto[-1], seen, "straight")
+        refused.append(NoWayError(limb, "on the straight way in joint space", seen.nearest, margin))
+    if not refused:
+        raise InvalidInputError("at least one is needed", field="goals")
+    if onto:
+        ends = np.array([each[0] for each in onto])
+        found = search_way(free, back[-1], ends, margin, seed)
+        if found is not None:
+            way, seen = found
             which = int(np.abs(ends - way[-1]).max(axis=1).argmin())
-            return _joined(limb, back, way, on[which], clear, "searched")
-    raise NoWayError(limb, "on the straight way in joint space", seen[0].nearest, margin)
+            return _joined(limb, back, way, onto[which], seen, "searched")
+    raise refused[0]
 
 
-def _straight(scene: CollisionScene, limb: str, angles: Array, stand_off: float) -> Array:
+def _straight(robot: Robot, limb: str, angles: Array, stand_off: float) -> Array:
     """Return joint angles, shape (m, n), with which a hand goes straight back from its hold."""
-    pose = scene.robot.hand_poses({limb: angles})[limb]
+    pose = robot.hand_poses({limb: angles})[limb]
     away = np.linspace(0.0, stand_off, 6)[1:, None] * -pose.rotation[:, 2]
     poses = [Pose(pose.position + each, pose.rotation) for each in away]
-    return np.vstack([angles, follow_poses(scene.robot, limb, angles, poses)])
+    return np.vstack([angles, follow_poses(robot, limb, angles, poses)])
 
 
 def _require(limb: str, seen: Clear, where: str, margin: float) -> None:

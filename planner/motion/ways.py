@@ -137,7 +137,7 @@ def _clear_part(space: JointSpace, start: Array, end: Array, margin: float) -> t
     done, batch = 0, 16
     while done < count:
         part = postures[done : done + batch]
-        good = space.clearances(part).min(axis=1) >= margin
+        good = space.clearances(part, margin).min(axis=1) >= margin
         if not good.all():
             return done + int(good.argmin()), postures
         done += len(part)
@@ -147,7 +147,7 @@ def _clear_part(space: JointSpace, start: Array, end: Array, margin: float) -> t
 
 def search_way(
     space: JointSpace, start: Array, goals: Array, margin: float, seed: int
-) -> Array | None:
+) -> tuple[Array, Clear] | None:
     """Search a clear way from a posture to one of several, shortened by straight lines.
 
     Parameters
@@ -164,8 +164,10 @@ def search_way(
 
     Returns
     -------
-    ndarray, shape (m, d), or None
-        Joint angles at the corners of the way; None if none was found.
+    way : ndarray, shape (m, d)
+        Joint angles at the corners of the way [rad].
+    seen : Clear
+        Its proof. None is returned if no way was found.
 
     Raises
     ------
@@ -188,7 +190,11 @@ def search_way(
         if met:
             first, second = one.branch(at), other.branch(to)
             way = [*first[::-1], *second[1:]] if k % 2 == 0 else [*second[::-1], *first[1:]]
-            return _shortened(space, np.array(way), margin, rng)
+            short = _shortened(space, np.array(way), margin, rng)
+            seen = check_way(space, short, margin)
+            if seen.clear:
+                return short, seen
+            # something is met between two postures that were looked at: the trees go on
     return None
 
 

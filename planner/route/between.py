@@ -95,9 +95,9 @@ class Passage:
         """Return the posture that is interpolated at a time t from 0 to 1."""
         start, end = self.start.posed, self.end.posed
         place = _mixed(start.body.position, end.body.position, t)
-        body = start.body if self.still else Pose(
-            place, start.body.rotation @ turns_about(t * self.turn)
-        )
+        body = start.body
+        if start.body is not end.body:
+            body = Pose(place, start.body.rotation @ turns_about(t * self.turn))
         angles = {limb: _mixed(at, end.angles[limb], t) for limb, at in start.angles.items()}
         moving = end.moving
         if moving is not None and start.moving is not None:

@@ -9,9 +9,10 @@ back from its hold, through the air and on to the next; it *closes* along its cl
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 from msgspec import structs
@@ -30,6 +31,7 @@ from planner.prepare import posture, settle_each
 from planner.programs import CAP_SLACK
 from planner.robots import UnreachableError, solve_limbs
 from planner.route.between import Passage
+from planner.route.branch_choice import bodies_until_lifted, lasting, start_joints
 from planner.route.climb import Move, Route, RouteStage, in_route, stages
 from planner.route.evaluation import must_touch
 from planner.route.held import Held, MovingHand, NoPlanError, Posed, hold_as_planned, hold_with
@@ -160,7 +162,9 @@ class _Planner:
         with self._in("start"):
             where = posture(self._stages[0].question)
             assert where is not None
-            posed = Posed(self._route, stance.hands, stance.body, where.angles)
+            angles = start_joints(self._route, self._scene, where.angles)
+            self._require_clear(stance.body, angles)
+            posed = Posed(self._route, stance.hands, stance.body, angles)
             self._at = self._plan(posed, stage=True)
         self._append(self._at, None, stage=True)
 
@@ -185,6 +189,12 @@ class _Planner:
     def _shift(self, goal: Pose) -> None:
         """Shift the body on all hands."""
         self._go(self._plan(self._shifted(self._at.posed, goal), stage=True), stage=True)
+
+    def _require_clear(self, body: Pose, angles: Mapping[str, Array]) -> None:
+        """Refuse a posture in which a link is in rock or in another."""
+        nearest = self._scene.nearest(body, angles)
+        if nearest.distance < 0.0:
+            raise NoPlanError(str(nearest))
 
     def _unload(self, limb: str) -> list[MovingHand]:
         """Take the load off the leaving hand; return its states while it opens."""
@@ -226,18 +236,22 @@ class _Planner:
         if isinstance(given, np.ndarray):
             goals: Sequence[Array] = [given]
         else:
-            goals = branches(robot, limb, target, posed.angles[limb])
-        if not goals:
-            solve_limbs(robot, {limb: target}, {}, np.zeros(3))
-            raise NoPlanError(f"no joint angles were found for {limb} on its new hold")
-        found = swing(self._scene, posed.body, posed.angles, limb, goals)
+            found = branches(robot, limb, target, posed.angles[limb], count=32)
+            if not found:
+                solve_limbs(robot, {limb: target}, {}, np.zeros(3))
+                raise NoPlanError(f"no joint angles were found for {limb} on its new hold")
+            later, lifts = bodies_until_lifted(self._route.moves[self._move :], limb)
+            bodies, place = [posed.body, *later], move.hand.pose
+            clear = lasting(self._scene, limb, place, bodies, posed.angles, found, lifts=lifts)
+            goals = [*islice(clear, 6)] or found[:6]
+        way = swing(self._scene, posed.body, posed.angles, limb, goals)
         assert posed.moving is not None
         air = in_air(posed.moving)
-        for k, angles in enumerate(found.path[1:], start=1):
+        for k, angles in enumerate(way.path[1:], start=1):
             # on the first way from the rock its wrench goes, somehow
             moving = replace(air, deviation=np.abs(posed.moving.wrench)) if k == 1 else air
             at = replace(self._at.posed, angles={**posed.angles, limb: angles}, moving=moving)
-            self._go(self._plan(at, stage=k == found.retreat), stage=k == found.retreat)
+            self._go(self._plan(at, stage=k == way.retreat), stage=k == way.retreat)
 
     def _arrived(self, place: HandOnHold) -> tuple[Posed, list[MovingHand]]:
         """Return the posture on the new hold, with all hands, and the states of the closing hand."""
@@ -273,21 +287,24 @@ class _Planner:
 
     def _plan(self, posed: Posed, *, stage: bool = False) -> Held:
         """Return the plan of a posture; between stages palms press, so that they can settle."""
-        held = None
-        if not stage:
+        press = self._numbers.press
+        for least in (0.0,) if stage else (press, 0.25 * press, 0.0):
             try:
-                held = hold_as_planned(posed, self._near, self._numbers.press)
+                held = hold_as_planned(posed, self._near, least)
             except NoPlanError:
-                pass  # palms cannot press so much
-        held = held or hold_as_planned(posed, self._near)
-        self._near = held.solution
-        return held
+                if not least:
+                    raise
+            else:
+                self._near = held.solution
+                return held
+        raise AssertionError  # the last one returns or raises
 
     def _shifted(self, posed: Posed, body: Pose) -> Posed:
         """Return a posture with the body elsewhere and all hands where they are."""
         robot, hands = self._route.start.robot, {hand.limb: hand.pose for hand in posed.hands}
         found = shift_postures(robot, hands, [body], posed.angles)
         angles = {**posed.angles, **{limb: each[-1] for limb, each in found.items()}}
+        self._require_clear(body, angles)
         return replace(posed, body=body, angles=angles)
 
     def _go(self, end: Held, *, stage: bool = False, halvings: int | None = None) -> None:
@@ -296,7 +313,8 @@ class _Planner:
         start, numbers = self._at, self._numbers
         passage = Passage(start, end, numbers.excess)
         bound, top = passage.bound(), max(start.utilisation, end.utilisation)
-        near = bound <= (1.0 + numbers.excess) * top + numbers.excess_floor
+        cap = self._route.limits.utilisation + CAP_SLACK
+        near = bound <= min((1.0 + numbers.excess) * top + numbers.excess_floor, cap)
         if not passage.still and left and not (near and passage.slack() <= numbers.slack):
             middle = passage.posed(0.5)
             if middle.body is not start.posed.body:
@@ -304,7 +322,7 @@ class _Planner:
             self._go(self._plan(middle), halvings=left - 1)
             self._go(end, stage=stage, halvings=left - 1)
             return
-        if not bound <= self._route.limits.utilisation + CAP_SLACK:
+        if not bound <= cap:
             raise NoPlanError(
                 "between two knots passive reactions do not balance the way of the centre of mass"
                 if math.isinf(bound)

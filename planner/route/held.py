@@ -11,6 +11,7 @@ import numpy as np
 from msgspec import structs
 
 from hand_models.base import Array, Pose, wrench_transport
+from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from hand_models.hand import FINGERS
 from planner.explanation import joint_name, limit_name
 from planner.prepare import Posture, PreparedStance, assemble, posture_at
@@ -241,7 +242,7 @@ def hold_as_planned(posed: Posed, near: Solution | None = None, press: float = 0
     near : Solution, optional
         Solution of the same hands, as a warm start.
     press : float, optional
-        Force with which palms press at least [N].
+        Force with which palms press, and drag, at least [N].
 
     Raises
     ------
@@ -263,11 +264,12 @@ def hold_as_planned(posed: Posed, near: Solution | None = None, press: float = 0
 
 
 def _pressing(prepared: PreparedStance, press: float) -> PreparedStance:
-    """Return a stance whose palms press on the rock at least with a force [N]."""
+    """Return a stance whose palms press and drag on the rock at least with a force [N]."""
     spaces, scaled, hands = [], [], prepared.hands
+    ways = (f"{PALM_PRESSING}_reversed", f"{PALM_SHEAR}_reversed")
     for space, rows in zip(hands.spaces, hands.scaled, strict=True):
         least = press * np.array(
-            [row.limit == "palm_pressing_reversed" for row in space.rows[len(space.s) :]]
+            [row.limit in ways for row in space.rows[len(space.s) :]], dtype=float
         )
         spaces.append(replace(space, h=space.h - least))
         scaled.append(rows._replace(h=rows.h - least / LOAD_UNIT))
