@@ -12,5 +12,11 @@ from .collisions import (
 )
 from .rocks import Rock as Rock, rock_distances as rock_distances, rocks_of as rocks_of
 from .settings import MOTION_SETTINGS as MOTION_SETTINGS, MotionSettings as MotionSettings
-from .swings import NoWayError as NoWayError, Swing as Swing, swing as swing
+from .swings import (
+    NoWayError as NoWayError,
+    Swing as Swing,
+    check_shift as check_shift,
+    clear_branches as clear_branches,
+    swing as swing,
+)
 from .ways import Clear as Clear, check_way as check_way

@@ -1,13 +1,14 @@
-"""One branch of a limb's inverse kinematics kept along a path of hand poses.
+"""One branch of a limb's inverse kinematics kept along a path of hand poses, and several to choose.
 
-The step to the next pose is Newton's with weighted least norm: joints that come near a limit move
-less (Chan and Dubey, *A weighted least-norm solution based scheme for avoiding joint limits for
-redundant joint manipulators*, IEEE Transactions on Robotics and Automation, 1995).
+The step to the next pose is Newton's of least norm (kinematics by Pinocchio). A limb of more than
+six joints also moves a little along directions that leave its hand where it is, as much as its
+joints turn anyway: off its limits and off postures in which its hand cannot move every way.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -67,17 +68,19 @@ class _Limb:
     def __init__(self, robot: Robot, limb: str) -> None:
         self.limb, self.chain = limb, robot.chains[limb]
         self._robot, self._q = robot, robot.configuration({})
-        self._still = Pose.identity()
+        self._still = self.target(Pose.identity())
 
-    def errors(self, angles: Array, target: Pose) -> tuple[Array, Array]:
-        """Return the twist in H to a pose in B, (6,), over the reach, and its Jacobian (6, n)."""
+    def target(self, pose: Pose) -> Any:
+        """Return a pose of H in B as Pinocchio's, in the root link."""
+        there = self._robot.root @ pose
+        return pin.SE3(there.rotation, there.position)
+
+    def errors(self, angles: Array, target: Any) -> tuple[Array, Array]:
+        """Return the twist in H to a target, (6,), over the reach, and its Jacobian (6, n)."""
         model, data, chain = self._robot.model, self._robot.data, self.chain
         chain.turn(self._q, angles)
         pin.computeJointJacobians(model, data, self._q)
-        there = self._robot.root @ target
-        off = pin.updateFramePlacement(model, data, chain.frame).actInv(
-            pin.SE3(there.rotation, there.position)
-        )
+        off = pin.updateFramePlacement(model, data, chain.frame).actInv(target)
         jacobian = pin.getFrameJacobian(model, data, chain.frame, pin.ReferenceFrame.LOCAL)
         J = jacobian[:, chain.columns] @ chain.coupling
         error = np.concatenate([off.translation, pin.log3(off.rotation)])
@@ -85,9 +88,9 @@ class _Limb:
         J[:3] /= chain.reach
         return error, J
 
-    def follow(self, start: Array, target: Pose) -> Array | None:
+    def follow(self, start: Array, pose: Pose) -> Array | None:
         """Return angles near others that solve a pose; None if none are near enough."""
-        chain, settings = self.chain, MOTION_SETTINGS
+        target, chain, settings = self.target(pose), self.chain, MOTION_SETTINGS
         angles, drift = start, None
         for _ in range(settings.newton_steps):
             error, J = self.errors(angles, target)
@@ -99,10 +102,9 @@ class _Limb:
             for _ in range(len(angles)):
                 step = free * (J.T @ np.linalg.solve((J * free) @ J.T + 1e-12 * np.eye(6), error))
                 # a joint at a limit that it would leave stays there
-                stuck = (angles <= chain.lower) & (step < 0.0) | (angles >= chain.upper) & (
-                    step > 0.0
-                )
-                if not (stuck & (free > 0.0)).any():
+                stuck = (angles <= chain.lower) & (step < 0.0)
+                stuck |= (angles >= chain.upper) & (step > 0.0)
+                if not stuck.any():
                     break
                 free[stuck] = 0.0
             # at first, as much as the joints turn anyway
@@ -138,11 +140,10 @@ class _Limb:
         _, J = self.errors(angles, self._still)
         return 0.5 * float(np.linalg.slogdet(J @ J.T + 1e-12 * np.eye(6))[1])
 
-    def lacking(self, angles: Array, target: Pose) -> str:
+    def lacking(self, angles: Array, pose: Pose) -> str:
         """Say what keeps the limb from a pose, from the angles that it has."""
-        chain, (error, J) = self.chain, self.errors(angles, target)
-        within = MOTION_SETTINGS.at_limit
-        slope = error @ J
+        chain, (error, J) = self.chain, self.errors(angles, self.target(pose))
+        within, slope = MOTION_SETTINGS.at_limit, error @ J
         low = (angles - chain.lower < within) & (slope < 0.0)
         high = (chain.upper - angles < within) & (slope > 0.0)
         stopped = []
@@ -150,14 +151,13 @@ class _Limb:
             limit = chain.lower[i] if low[i] else chain.upper[i]
             unit = "m" if chain.sliding[i] else "rad"
             stopped.append(f"{chain.joints[i]} is at its limit of {limit:.4g} {unit}")
-        size = np.linalg.svd(J, compute_uv=False)
-        if size[-1] < MOTION_SETTINGS.singular:
-            stopped.append("the limb is stretched or folded, where it cannot move every way")
+        if np.linalg.svd(J, compute_uv=False)[-1] < MOTION_SETTINGS.singular:
+            stopped.append("it is stretched or folded, so that the hand cannot move every way")
         if not stopped:
-            stopped.append(
-                f"a joint would turn by more than {MOTION_SETTINGS.largest_step:g} rad at once"
-            )
-        return ", and ".join(stopped)
+            step = MOTION_SETTINGS.largest_step
+            stopped.append(f"a joint would turn by more than {step:g} rad at once")
+        way, turn = np.linalg.norm(error[:3]) * chain.reach, np.linalg.norm(error[3:])
+        return f"{', and '.join(stopped)}, {1e3 * way:.3g} mm and {turn:.2g} rad from the next pose"
 
 
 def follow_poses(robot: Robot, limb: str, start_angles: Array, poses: Sequence[Pose]) -> Array:
@@ -199,7 +199,7 @@ def follow_poses(robot: Robot, limb: str, start_angles: Array, poses: Sequence[P
                 step *= 0.5
                 if step < 0.5**MOTION_SETTINGS.finest:
                     share = (i + done) / len(poses)
-                    raise BranchEndError(limb, share, one.lacking(angles, target))
+                    raise BranchEndError(limb, share, one.lacking(angles, pose))
                 continue
             angles, done = moved, part
             step *= 2.0

@@ -21,7 +21,7 @@ class MotionSettings:
     """Error of a pose that is followed, of the limb's reach [1] or [rad]."""
     at_limit: float = 1e-3
     """Distance of a joint from its limit at which it counts as there [rad]."""
-    singular: float = 1e-3
+    singular: float = 0.02
     """Least singular value of a hand's Jacobian over the reach at which it is singular [1]."""
     finest: int = 10
     """Times that a step between two poses is halved before a branch counts as ended."""

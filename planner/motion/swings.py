@@ -13,12 +13,12 @@ from typing import Literal
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError, Pose
-from planner.motion.branch import BranchEndError, follow_poses
+from planner.motion.branch import BranchEndError, branches, follow_poses
 from planner.motion.collisions import CollisionScene, JointSpace, Nearest
 from planner.motion.ways import Clear, check_way, search_way
 from planner.robots import Robot, scene_number
 
-__all__ = ["NoWayError", "Swing", "swing"]
+__all__ = ["NoWayError", "Swing", "check_shift", "clear_branches", "swing"]
 
 
 class NoWayError(InvalidInputError):
@@ -186,3 +186,81 @@ def _joined(
     path = np.vstack([back, way[1:], on[1:]])
     retreat = len(back) - 1
     return Swing(limb, path, retreat, retreat + len(way) - 1, seen.nearest, seen.bound, how)
+
+
+def clear_branches(
+    scene: CollisionScene,
+    body: Pose,
+    joints: Mapping[str, Array],
+    limb: str,
+    pose: Pose,
+    *,
+    margin: float | None = None,
+    count: int = 8,
+) -> tuple[Array, ...]:
+    """Return joint angles of several kinds that put a hand on its hold, clear of all else.
+
+    Parameters
+    ----------
+    scene : CollisionScene
+    body : Pose
+        Pose of B in W.
+    joints : mapping of str to ndarray, shape (n,)
+        Joint angles of every other limb, and those that the first ones are to be nearest to [rad].
+    limb : str
+    pose : Pose
+        Pose of H in W, closed on its hold.
+    margin : float, optional
+        As of `swing`.
+    count : int
+        Number of kinds that are looked at, at most.
+
+    Returns
+    -------
+    tuple of ndarray, shape (n,)
+        Joint angles, the nearest first [rad]; none if no clear ones were found.
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline passes first.
+    """
+    margin = scene_number("motion", "margin") if margin is None else margin
+    robot, found = scene.robot, []
+    for angles in branches(robot, limb, body.inverse() @ pose, joints.get(limb), count):
+        held = JointSpace(scene, [body], {**joints, limb: angles}, (limb,), touching=robot.limbs)
+        if held.clearances(angles[None], margin).min() >= margin:
+            found.append(angles)
+    return tuple(found)
+
+
+def check_shift(
+    scene: CollisionScene,
+    bodies: Sequence[Pose],
+    joints: Mapping[str, Array],
+    *,
+    margin: float | None = None,
+) -> Clear:
+    """Prove that the robot is clear while its body shifts on hands that stay, or find where not.
+
+    Parameters
+    ----------
+    scene : CollisionScene
+    bodies : sequence of Pose, length m, at least 2
+        Poses of B in W, from the first one on; between two of them position and joint angles change
+        linearly, and the orientation along the shortest turn.
+    joints : mapping of str to ndarray, shape (m, n)
+        Angles of the limbs that hold rock [rad]; those of a limb left out are its rest angles.
+    margin : float, optional
+        As of `swing`.
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline passes first.
+    """
+    margin = scene_number("motion", "margin") if margin is None else margin
+    first = {limb: angles[0] for limb, angles in joints.items()}
+    space = JointSpace(scene, bodies, first, tuple(joints), touching=scene.robot.limbs)
+    progress = np.arange(float(len(bodies)))[:, None]
+    return check_way(space, np.hstack([*joints.values(), progress]), margin)

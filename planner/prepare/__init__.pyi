@@ -44,5 +44,6 @@ from .stance_constraints import (
     PASSIVE_JOINT as PASSIVE_JOINT,
     TENSION_CHANGE as TENSION_CHANGE,
     TOLERANCES as TOLERANCES,
+    JointLoads as JointLoads,
     StanceConstraints as StanceConstraints,
 )

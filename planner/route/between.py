@@ -110,6 +110,8 @@ class Passage:
                 wrench=_mixed(first.wrench, moving.wrench, t),
                 utilisation=max(first.utilisation, moving.utilisation),
             )
+        if self.still:
+            return start.beside(moving)
         return Posed(start.route, start.hands, body, angles, moving)
 
     def hold(self, t: float) -> Held:
@@ -159,14 +161,19 @@ class Passage:
         rows, changing = self._rows, self._rows.changing
         middle = self.posed(0.5)
         moving = [held.posed.moving for held in (self.start, self.end)]
-        most = max([0.0, *(each.utilisation for each in moving if each is not None and each.on_rock)])
+        most = max(
+            [0.0, *(each.utilisation for each in moving if each is not None and each.on_rock)]
+        )
         ball, box = self._ball, self._box
         d, e = np.zeros(len(rows.used)), np.zeros(len(rows.used))
         if ball.any() or box.any():
             if not self._balances(ball) or not self._balances(box):
                 return math.inf
             d, e = self._beyond(rows.used)
-            slack = [rows.most - rows.hard @ np.concatenate(held.loads) for held in (self.start, self.end)]
+            slack = [
+                rows.most - rows.hard @ np.concatenate(held.loads)
+                for held in (self.start, self.end)
+            ]
             out, wide = self._beyond(rows.hard)
             if (_room(slack[0] - wide, slack[1] - wide) < out - 1e-9).any():
                 return math.inf
@@ -180,9 +187,10 @@ class Passage:
     def _idle(self, middle: Posed) -> float:
         """Return the largest utilisation of the joints of limbs whose hand is not in the sets."""
         most, box = 0.0, self._deviation
-        for limb in middle.posture.idle(middle.prepared.question.stance):
-            shares = []
-            for posed in (self.start.posed, middle, self.end.posed):
+        times = [self.start.posed, middle, self.end.posed]
+        for limb in middle.idle:
+            shares, mine = [], False
+            for posed in times:
                 own, moving = posed.posture.joints[limb].driven, posed.moving
                 mine = moving is not None and moving.limb == limb
                 wrench = moving.wrench if moving is not None and mine else np.zeros(6)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+import numpy as np
+
 from hand_models.base import Array, Pose
 from planner.motion import BranchEndError, CollisionScene, JointSpace, branches, follow_poses
-from planner.robots import scene_number
+from planner.robots import Robot, scene_number
 from planner.route.climb import Move, Route
 
-__all__ = ["bodies_until_lifted", "lasting", "start_joints"]
+__all__ = ["bodies_until_lifted", "candidates_on", "lasting", "start_joints"]
 
 
 def bodies_until_lifted(moves: Iterable[Move], limb: str) -> tuple[list[Pose], bool]:
@@ -69,7 +71,7 @@ def lasting(
         bodies, ways = [*bodies, bodies[-1]], [*ways, tuple(others)]
     # the other limbs as they are now, though they will move with the body
     spaces = [
-        JointSpace(scene, body, joints, (limb,), touching=touching)
+        JointSpace(scene, [body], joints, (limb,), touching=touching)
         for body, touching in zip(bodies, ways, strict=True)
     ]
     for angles in candidates:
@@ -82,7 +84,30 @@ def lasting(
             yield angles
 
 
-def start_joints(route: Route, scene: CollisionScene, found: Mapping[str, Array]) -> dict[str, Array]:
+def candidates_on(
+    robot: Robot, limb: str, hand: Pose, bodies: Sequence[Pose], near: Array
+) -> list[Array]:
+    """Return joint angles of several kinds that put a hand on its hold, the nearest first [rad].
+
+    Some are found where the body is now, some where it is at last and followed back.
+
+    Parameters as in `lasting`; ``near``, shape (n,), are the angles that others are compared with.
+    """
+    count = 32
+    inside = [body.inverse() @ hand for body in bodies]
+    found = list(branches(robot, limb, inside[0], near, count))
+    if len(bodies) > 1:
+        for angles in branches(robot, limb, inside[-1], near, count):
+            try:
+                found.append(follow_poses(robot, limb, angles, inside[-2::-1])[-1])
+            except BranchEndError:
+                continue
+    return sorted(found, key=lambda each: float(np.abs(each - near).max()))
+
+
+def start_joints(
+    route: Route, scene: CollisionScene, found: Mapping[str, Array]
+) -> dict[str, Array]:
     """Return joint angles of the start stance of limbs whose joints are to be found.
 
     Parameters
@@ -97,14 +122,12 @@ def start_joints(route: Route, scene: CollisionScene, found: Mapping[str, Array]
     for place in start.hands:
         if place.limb not in start.solved_limbs:
             continue
-        limb, here = place.limb, start.body.inverse() @ place.pose
-        near = found[limb]
+        limb, near = place.limb, found[place.limb]
         later, lifts = bodies_until_lifted(route.moves, limb)
-        found_here = [near, *branches(scene.robot, limb, here, near, count=32)]
-        for until, leaves in (([start.body, *later], lifts), ([start.body], False)):
-            clear = lasting(
-                scene, limb, place.pose, until, joints, found_here, lifts=leaves
-            )
+        whole = [start.body, *later]
+        others = [near, *candidates_on(scene.robot, limb, place.pose, whole, near)]
+        for until, leaves in ((whole, lifts), ([start.body], False)):
+            clear = lasting(scene, limb, place.pose, until, joints, others, lifts=leaves)
             best = next(clear, None)
             if best is not None:
                 joints[limb] = best

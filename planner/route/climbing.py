@@ -22,7 +22,6 @@ from planner.motion import (
     BranchEndError,
     CollisionScene,
     NoWayError,
-    branches,
     rocks_of,
     shift_postures,
     swing,
@@ -31,7 +30,7 @@ from planner.prepare import posture, settle_each
 from planner.programs import CAP_SLACK
 from planner.robots import UnreachableError, solve_limbs
 from planner.route.between import Passage
-from planner.route.branch_choice import bodies_until_lifted, lasting, start_joints
+from planner.route.branch_choice import bodies_until_lifted, candidates_on, lasting, start_joints
 from planner.route.climb import Move, Route, RouteStage, in_route, stages
 from planner.route.evaluation import must_touch
 from planner.route.held import Held, MovingHand, NoPlanError, Posed, hold_as_planned, hold_with
@@ -217,14 +216,14 @@ class _Planner:
             state = states[k]
             after = states[k + 1] if k + 1 < len(states) else None
             if after is None or np.abs(after.tensions - state.tensions).max() > 1e-6:
-                self._go(self._plan(replace(self._at.posed, moving=state)))
+                self._go(self._plan(self._at.posed.beside(state)))
                 k += 1
                 continue
             # spines let go or catch at one tension: all others keep theirs
             middle = replace(state, wrench=0.5 * (state.wrench + after.wrench))
-            held = self._plan(replace(self._at.posed, moving=middle))
+            held = self._plan(self._at.posed.beside(middle))
             for each in (state, after):
-                posed = replace(held.posed, moving=each)
+                posed = held.posed.beside(each)
                 self._go(hold_with(posed, Passage(held, held).settled(0.0, posed)))
             k += 2
 
@@ -236,12 +235,12 @@ class _Planner:
         if isinstance(given, np.ndarray):
             goals: Sequence[Array] = [given]
         else:
-            found = branches(robot, limb, target, posed.angles[limb], count=32)
+            later, lifts = bodies_until_lifted(self._route.moves[self._move :], limb)
+            bodies, place = [posed.body, *later], move.hand.pose
+            found = candidates_on(robot, limb, place, bodies, posed.angles[limb])
             if not found:
                 solve_limbs(robot, {limb: target}, {}, np.zeros(3))
                 raise NoPlanError(f"no joint angles were found for {limb} on its new hold")
-            later, lifts = bodies_until_lifted(self._route.moves[self._move :], limb)
-            bodies, place = [posed.body, *later], move.hand.pose
             clear = lasting(self._scene, limb, place, bodies, posed.angles, found, lifts=lifts)
             goals = [*islice(clear, 6)] or found[:6]
         way = swing(self._scene, posed.body, posed.angles, limb, goals)
@@ -250,7 +249,7 @@ class _Planner:
         for k, angles in enumerate(way.path[1:], start=1):
             # on the first way from the rock its wrench goes, somehow
             moving = replace(air, deviation=np.abs(posed.moving.wrench)) if k == 1 else air
-            at = replace(self._at.posed, angles={**posed.angles, limb: angles}, moving=moving)
+            at = self._at.posed.beside(moving, angles)
             self._go(self._plan(at, stage=k == way.retreat), stage=k == way.retreat)
 
     def _arrived(self, place: HandOnHold) -> tuple[Posed, list[MovingHand]]:

@@ -14,7 +14,7 @@ from hand_models.base import Array, Pose, wrench_transport
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from hand_models.hand import FINGERS
 from planner.explanation import joint_name, limit_name
-from planner.prepare import Posture, PreparedStance, assemble, posture_at
+from planner.prepare import JointLoads, Posture, PreparedStance, assemble, posture_at
 from planner.programs import CAP_SLACK, LOAD_UNIT
 from planner.question import HandOnHold, Question, Stance
 from planner.result import LimitName, LoadRecovery, PlanArrays
@@ -105,9 +105,7 @@ class Posed:
         weight, moving = self._whole.needed_wrench(self.posture.weights), self.moving
         if moving is None or not moving.on_rock:
             return weight
-        return np.asarray(
-            weight + wrench_transport(self.hand_poses[moving.limb]) @ moving.wrench
-        )
+        return np.asarray(weight + wrench_transport(self.hand_poses[moving.limb]) @ moving.wrench)
 
     @cached_property
     def prepared(self) -> PreparedStance:
@@ -117,6 +115,32 @@ class Posed:
             question = replace(question, body_wrench=self.needed)
         parts = assemble(question, self.posture, self.needed)
         return PreparedStance(question, self.posture, *parts, self.needed)
+
+    def beside(self, moving: MovingHand | None, angles: Array | None = None) -> Posed:
+        """Return the posture with another state of the moving hand, while all others hold still.
+
+        ``angles``, shape (n,), are new joint angles of its limb [rad]. What the others can carry is
+        not computed again.
+        """
+        joints = self.angles
+        if angles is not None and moving is not None:
+            joints = {**joints, moving.limb: angles}
+        found = replace(self, moving=moving, angles=joints)
+        if angles is None:
+            found.__dict__["posture"] = self.posture
+        question = found._whole
+        if moving is not None and moving.on_rock:
+            question = replace(question, body_wrench=found.needed)
+        before = self.prepared
+        found.__dict__["prepared"] = PreparedStance(
+            question, found.posture, before.batch, before.hands.turned(found.needed), found.needed
+        )
+        return found
+
+    @property
+    def idle(self) -> dict[str, JointLoads]:
+        """Joint loads of the limbs whose hands do not hold the robot, by limb."""
+        return self.posture.idle(self._whole.stance)
 
     @cached_property
     def hand_poses(self) -> dict[str, Pose]:
@@ -163,16 +187,14 @@ class Held:
     @cached_property
     def joint_torque(self) -> dict[str, Array]:
         """Joint torques of every limb, shape (n,) [N·m]."""
-        where = self.prepared.where
-        assert where is not None
-        return {limb: own.torques(self.wrenches[limb]) for limb, own in where.joints.items()}
+        joints = self.posed.posture.joints
+        return {limb: own.torques(self.wrenches[limb]) for limb, own in joints.items()}
 
     @cached_property
     def idle(self) -> list[tuple[float, LimitName]]:
         """Utilisation of the joints of limbs whose hand is not in the set of the stance."""
-        where, found = self.prepared.where, list[tuple[float, LimitName]]()
-        assert where is not None
-        for limb, own in where.idle(self.prepared.question.stance).items():
+        found = list[tuple[float, LimitName]]()
+        for limb, own in self.posed.idle.items():
             driven = own.driven
             shares = np.abs(driven.torques(self.wrenches[limb])) / driven.limits
             names = zip(driven.names, driven.sliding.tolist(), strict=True)
@@ -255,11 +277,12 @@ def hold_as_planned(posed: Posed, near: Solution | None = None, press: float = 0
     asked = _pressing(prepared, press) if press > 0.0 else prepared
     found = answer_on(asked, time.perf_counter(), checks, near, prove=press == 0.0)
     answer = found.answer
-    if not isinstance(answer, Verified) or answer.utilisation > prepared.question.limits.utilisation + CAP_SLACK:
+    if (
+        not isinstance(answer, Verified)
+        or answer.utilisation > prepared.question.limits.utilisation + CAP_SLACK
+    ):
         raise NoPlanError(found.reason or "no plan passes the checks")
-    held = Held(
-        posed, prepared, answer.solution.loads, answer.arrays, answer.used, answer.solution
-    )
+    held = Held(posed, prepared, answer.solution.loads, answer.arrays, answer.used, answer.solution)
     return _checked(held)
 
 
