@@ -359,10 +359,7 @@ def _print_moves(climb: Mapping[str, Any], out: Console) -> None:
     """Print the moves of a climb's summary, and why it fails."""
 
     def limit(row: Mapping[str, Any]) -> str | None:
-        if row["limiting"] is None:
-            return None
-        found = planner.LimitName(**row["limiting"])
-        return f"{found.limb}: {planner.constraint_words(found)}"
+        return " ".join(filter(None, (row["limiting"] or {}).values())) or None
 
     columns = (
         name("move", lambda row: str(row["move"] or "start")),
