@@ -21,7 +21,7 @@ from service.answering.stances import (
     stance,
     with_rocks,
 )
-from service.replies import KnotReply, RouteReply, RouteStageReply
+from service.replies import ClimbFailureReply, KnotReply, RouteReply, RouteStageReply
 
 if TYPE_CHECKING:
     from planner import Route, RouteStage
@@ -233,5 +233,5 @@ def climb(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> Ro
         ],
         warnings=list(dict.fromkeys(text for p in result.plans for text in p.warnings)),
         trajectory=UNSET if found is None else [KnotReply.of(knot) for knot in found.knots],
-        failure=UNSET if found is None else found.failure,
+        failure=UNSET if found is None else ClimbFailureReply.of(found.failure),
     )

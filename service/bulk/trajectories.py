@@ -9,10 +9,10 @@ import msgspec
 
 from hand_models.base import InvalidInputError, whole_file
 from hand_models.hand import FINGERS
-from planner import Failure, LimitName
+from planner import LimitName
 from service.bulk.columns import Column, value_at
 from service.bulk.exports import exporter_at
-from service.replies import WRENCH_AXES, KnotReply
+from service.replies import WRENCH_AXES, ClimbFailureReply, KnotReply
 
 __all__ = [
     "ClimbSummary",
@@ -95,7 +95,7 @@ def read_trajectory(folder: Path) -> list[KnotReply]:
 class ClimbOutcome(msgspec.Struct):
     """What a summary says of a climb's end: ``failure`` is None if it runs from end to end."""
 
-    failure: Failure | None
+    failure: ClimbFailureReply | None
 
 
 class ClimbSummary(msgspec.Struct):

@@ -1,4 +1,5 @@
 from .climb import (
+    ClimbFailureReply as ClimbFailureReply,
     ClimbSetPoints as ClimbSetPoints,
     HandKnotReply as HandKnotReply,
     KnotReply as KnotReply,

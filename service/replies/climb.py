@@ -6,15 +6,18 @@ as the columns of ``trajectory.parquet``.
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 from msgspec import Struct
 
-from hand_models.base import Array
-from planner import HandKnot, Knot, LimitName
+from planner import LimitName
 from service.replies.reply import PlacedFrame, Vector
 
-__all__ = ["ClimbSetPoints", "HandKnotReply", "KnotReply"]
+if TYPE_CHECKING:
+    from hand_models.base import Array
+    from planner import Failure, HandKnot, Knot
+
+__all__ = ["ClimbFailureReply", "ClimbSetPoints", "HandKnotReply", "KnotReply"]
 
 
 class HandKnotReply(Struct, kw_only=True):
@@ -109,6 +112,28 @@ class KnotReply(Struct, kw_only=True):
             limiting=knot.limiting,
             verified=knot.verified,
         )
+
+
+class ClimbFailureReply(Struct, kw_only=True):
+    """Why a climb ends in the middle of a move.
+
+    - ``move``: number of the move, from one; zero if the start has no plan.
+    - ``phase``: the part of the move that fails, as of a knot.
+    - ``limb``: name of the limb that moves; null for the start.
+    - ``reason``: one sentence that says what is missing, or which link meets what.
+    """
+
+    move: int
+    phase: str
+    limb: str | None
+    reason: str
+
+    @classmethod
+    def of(cls, failure: Failure | None) -> Self | None:
+        """Convert the planner's failure; None stays None."""
+        if failure is None:
+            return None
+        return cls(move=failure.move, phase=failure.phase, limb=failure.limb, reason=failure.reason)
 
 
 class ClimbSetPoints(Struct, kw_only=True):

@@ -8,7 +8,6 @@ from planner import (
     Advice,
     CertificateOf,
     Clearance,
-    Failure,
     Finding,
     Finger,
     LimitName,
@@ -25,7 +24,7 @@ from planner import (
     TensionPath,
     Time,
 )
-from service.replies.climb import KnotReply
+from service.replies.climb import ClimbFailureReply, KnotReply
 from service.replies.reply import Reply, SeatingReply, StanceReply, Vector, WrenchSet, Wrist
 from service.replies.spaces import ComRegionReply
 
@@ -344,4 +343,4 @@ class RouteReply(Reply, kw_only=True):
     stages: list[RouteStageReply]
     warnings: list[str]
     trajectory: list[KnotReply] | UnsetType = UNSET
-    failure: Failure | UnsetType | None = UNSET
+    failure: ClimbFailureReply | UnsetType | None = UNSET

@@ -8,11 +8,12 @@ does not exist is null; a result that the request does not name in ``want`` is l
 
 from __future__ import annotations
 
-from typing import Final, Literal, Self
+from typing import TYPE_CHECKING, Final, Literal, Self
 
 from msgspec import UNSET, Struct, UnsetType
 
-from hand_models.base import Pose
+if TYPE_CHECKING:
+    from hand_models.base import Pose
 
 __all__ = [
     "WRENCH_AXES",

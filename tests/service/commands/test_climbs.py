@@ -11,7 +11,7 @@ import pytest
 
 from service.bulk import read_climb_summary, read_trajectory
 from service.commands.cli import run_command_line
-from service.replies import KnotReply
+from service.replies import ClimbFailureReply, KnotReply
 from service.requests import RouteRequest
 from tests.suite.helpers.climbs import blocked, climbed, failed, two_moves
 from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED, complaint, result
@@ -110,7 +110,7 @@ def test_a_climb_that_fails_says_where_and_why(tmp_path, capfd):
     words = " ".join(printed.split())
     failure = failed().climb.failure
     assert f"move 2 fails (swing): {failure.reason}" in words
-    assert read_climb_summary(out).climb.failure == failure
+    assert read_climb_summary(out).climb.failure == ClimbFailureReply.of(failure)
     # as far as it comes, and every stage is there as a stance
     assert read_trajectory(out)[-1].phase == "open"
     assert len([*(out / "stages").iterdir()]) == len(failed().result.stages)

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from service import CruxClient
-from service.replies import KnotReply
+from service.replies import ClimbFailureReply, KnotReply
 from service.requests import RouteRequest
 from service.serving import PlanService, open_session, zenoh_config
 from service.wire import ServiceError, decode_request
@@ -50,7 +50,7 @@ def test_the_trajectory_of_a_reply_is_that_of_the_planner(client):
 
 def test_a_reply_says_where_a_climb_fails(client):
     reply = client.route(asked(blocked(), "trajectory"))
-    assert reply.failure == failed().climb.failure
+    assert reply.failure == ClimbFailureReply.of(failed().climb.failure)
     assert reply.trajectory[-1].move == 2
 
 
