@@ -125,16 +125,6 @@ class Passage:
         posed = self.posed(t)
         return hold_with(posed, self.settled(t, posed))
 
-    def slack(self) -> float:
-        """Return how far interpolated joints put hands from their holds in the middle [m]."""
-        if self.start.posed.body is self.end.posed.body:
-            return 0.0
-        posed = self.posed(0.5)
-        there = posed.route.start.robot.hand_poses(posed.angles)
-        off = [posed.body @ there[hand.limb] for hand in posed.hands]
-        pairs = zip(off, posed.hands, strict=True)
-        return max(float(np.linalg.norm(at.position - hand.pose.position)) for at, hand in pairs)
-
     def settled(self, t: float, posed: Posed) -> list[Array]:
         """Return loads of each hand, shape (m,), that balance a posture with tensions at t [N].
 

@@ -7,28 +7,38 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from hand_models.base import Array, Pose
-from planner.motion import BranchEndError, CollisionScene, JointSpace, branches, follow_poses
+from planner.motion import (
+    BranchEndError,
+    CollisionScene,
+    JointSpace,
+    branches,
+    follow_poses,
+    pose_between,
+)
 from planner.robots import Robot, scene_number
 from planner.route.climb import Move, Route
 
 __all__ = ["bodies_until_lifted", "candidates_on", "lasting", "start_joints"]
 
 
-def bodies_until_lifted(moves: Iterable[Move], limb: str) -> tuple[list[Pose], bool]:
-    """Return the poses of the body, in W, while a limb's hand stays on its hold.
+def bodies_until_lifted(body: Pose, moves: Iterable[Move], limb: str) -> tuple[list[Pose], bool]:
+    """Return poses of the body, in W, while a limb's hand stays on its hold, the present one first.
 
-    The second is whether the hand leaves its hold at the last of them.
+    Between those of the moves are some halfway. The second is whether the hand leaves its hold at
+    the last of them.
 
     Parameters
     ----------
+    body : Pose
+        Present pose of the body.
     moves : iterable of Move
         The moves that are left; in that of the limb itself the body shifts before it lifts.
     limb : str
     """
-    found: list[Pose] = []
+    found = [body]
     for move in moves:
         if move.body is not None:
-            found.append(move.body)
+            found += [pose_between(found[-1], move.body, 0.5), move.body]
         if move.hand.limb == limb:
             return found, True
     return found, False
@@ -76,7 +86,7 @@ def lasting(
     ]
     for angles in candidates:
         try:
-            after = follow_poses(robot, limb, angles, inside[1:]) if inside[1:] else []
+            after = [*follow_poses(robot, limb, angles, inside[1:])] if inside[1:] else []
         except BranchEndError:
             continue
         pairs = zip(spaces, [angles, *after], strict=True)
@@ -123,8 +133,7 @@ def start_joints(
         if place.limb not in start.solved_limbs:
             continue
         limb, near = place.limb, found[place.limb]
-        later, lifts = bodies_until_lifted(route.moves, limb)
-        whole = [start.body, *later]
+        whole, lifts = bodies_until_lifted(start.body, route.moves, limb)
         others = [near, *candidates_on(scene.robot, limb, place.pose, whole, near)]
         for until, leaves in ((whole, lifts), ([start.body], False)):
             clear = lasting(scene, limb, place.pose, until, joints, others, lifts=leaves)

@@ -1,9 +1,9 @@
 """Plan a climb whole: every move from stance to stance as knots of verified loads.
 
-A move has these parts, in this order: the body *shifts* on all hands; the leaving hand is *unloaded*
-to its closing tensions, while the others take over; it *opens* along its opening path; it *swings*,
-back from its hold, through the air and on to the next; it *closes* along its closing path; and it is
-*loaded* as the plan of the new stance has it.
+A move has these parts, in this order: the body *shifts* on all hands; the leaving hand is
+*unloaded* to its closing tensions, while the others take over; it *opens* along its opening path;
+it *swings*, back from its hold, through the air and on to the next; it *closes* along its closing
+path; and it is *loaded* as the plan of the new stance has it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
 from msgspec import structs
@@ -22,12 +22,15 @@ from planner.motion import (
     BranchEndError,
     CollisionScene,
     NoWayError,
+    check_shift,
+    pose_between,
     rocks_of,
     shift_postures,
     swing,
 )
 from planner.prepare import posture, settle_each
 from planner.programs import CAP_SLACK
+from planner.question import HandOnHold
 from planner.robots import UnreachableError, solve_limbs
 from planner.route.between import Passage
 from planner.route.branch_choice import bodies_until_lifted, candidates_on, lasting, start_joints
@@ -187,7 +190,30 @@ class _Planner:
 
     def _shift(self, goal: Pose) -> None:
         """Shift the body on all hands."""
-        self._go(self._plan(self._shifted(self._at.posed, goal), stage=True), stage=True)
+        first, numbers = self._at.posed, self._numbers
+        robot, hands = self._route.start.robot, {each.limb: each.pose for each in first.hands}
+        for halvings in range(numbers.halvings + 1):
+            count = 2**halvings
+            parts = [k / count for k in range(1, count)]
+            bodies = [*(pose_between(first.body, goal, part) for part in parts), goal]
+            found = shift_postures(robot, hands, bodies, first.angles)
+            ways = {limb: np.vstack([first.angles[limb], each]) for limb, each in found.items()}
+            halfway = [pose_between(a, b, 0.5) for a, b in pairwise([first.body, *bodies])]
+            middle = {limb: 0.5 * (way[1:] + way[:-1]) for limb, way in ways.items()}
+            off = 0.0
+            for k, body in enumerate(halfway):
+                there = robot.hand_poses({limb: each[k] for limb, each in middle.items()})
+                away = [body.apply(there[limb].position) - hands[limb].position for limb in ways]
+                off = max(off, float(np.linalg.norm(away, axis=1).max()))
+            if off <= numbers.slack:
+                break
+        seen = check_shift(self._scene, [first.body, *bodies], ways)
+        if not seen.clear:
+            raise NoPlanError(f"while the body shifts, {seen.nearest}")
+        for k, body in enumerate(bodies, start=1):
+            angles = {**first.angles, **{limb: way[k] for limb, way in ways.items()}}
+            stage = body is goal
+            self._go(self._plan(replace(first, body=body, angles=angles), stage=stage), stage=stage)
 
     def _require_clear(self, body: Pose, angles: Mapping[str, Array]) -> None:
         """Refuse a posture in which a link is in rock or in another."""
@@ -235,8 +261,8 @@ class _Planner:
         if isinstance(given, np.ndarray):
             goals: Sequence[Array] = [given]
         else:
-            later, lifts = bodies_until_lifted(self._route.moves[self._move :], limb)
-            bodies, place = [posed.body, *later], move.hand.pose
+            left, place = self._route.moves[self._move :], move.hand.pose
+            bodies, lifts = bodies_until_lifted(posed.body, left, limb)
             found = candidates_on(robot, limb, place, bodies, posed.angles[limb])
             if not found:
                 solve_limbs(robot, {limb: target}, {}, np.zeros(3))
@@ -253,7 +279,7 @@ class _Planner:
             self._go(self._plan(at, stage=k == way.retreat), stage=k == way.retreat)
 
     def _arrived(self, place: HandOnHold) -> tuple[Posed, list[MovingHand]]:
-        """Return the posture on the new hold, with all hands, and the states of the closing hand."""
+        """Return the posture with the hand on its new hold, and its states while it closes."""
         posed, by_limb = self._at.posed, {hand.limb: hand for hand in self._at.posed.hands}
         by_limb[place.limb] = place
         order = [hand.limb for hand in self._route.start.hands]
@@ -303,7 +329,6 @@ class _Planner:
         robot, hands = self._route.start.robot, {hand.limb: hand.pose for hand in posed.hands}
         found = shift_postures(robot, hands, [body], posed.angles)
         angles = {**posed.angles, **{limb: each[-1] for limb, each in found.items()}}
-        self._require_clear(body, angles)
         return replace(posed, body=body, angles=angles)
 
     def _go(self, end: Held, *, stage: bool = False, halvings: int | None = None) -> None:
@@ -314,7 +339,7 @@ class _Planner:
         bound, top = passage.bound(), max(start.utilisation, end.utilisation)
         cap = self._route.limits.utilisation + CAP_SLACK
         near = bound <= min((1.0 + numbers.excess) * top + numbers.excess_floor, cap)
-        if not passage.still and left and not (near and passage.slack() <= numbers.slack):
+        if not (near or passage.still) and left:
             middle = passage.posed(0.5)
             if middle.body is not start.posed.body:
                 middle = self._shifted(start.posed, middle.body)

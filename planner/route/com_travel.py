@@ -79,7 +79,7 @@ def _levers(robot: Robot) -> dict[str, _Levers]:
 
 
 def turn_between(start: Pose, end: Pose) -> Array:
-    """Return the rotation vector, in W, of the shortest turn between two poses, shape (3,) [rad]."""
+    """Return the rotation vector (3,), in W, of the shortest turn between two poses [rad]."""
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_matrix(end.rotation @ start.rotation.T).as_rotvec())

@@ -108,5 +108,14 @@ class KnotNumbers(NamedTuple):
     def bundled(cls) -> Self:
         """Return the numbers of ``climb.toml``."""
         table = bundled_table("climb.toml", "planner.parameters")
-        found = [table.positive("knots", name) for name in cls._fields[:-1]]
-        return cls(*found, int(table.positive("knots", "halvings")))
+
+        def number(name: str) -> float:
+            return table.positive("knots", name)
+
+        return cls(
+            excess=number("excess"),
+            excess_floor=number("excess_floor"),
+            slack=number("slack"),
+            press=number("press"),
+            halvings=int(number("halvings")),
+        )

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from hand_models.base import InvalidInputError, Pose, UnsupportedError, wrench_transport
 from hand_models.hand import FINGERS
-from planner import ClimbSettings, Load, Question, Route, Stance, plan_climb, robosimian
+from planner import ClimbSettings, Limits, Load, Question, Route, Stance, plan_climb, robosimian
 from planner.prepare import posture, prepare_stance
 from planner.route.com_travel import mass_travel
 from service.answering import questions
@@ -24,7 +24,7 @@ def route() -> Route:
     """One move of the bundled route, after a small shift of the body."""
     bundled = questions.route_of(read_route("six-moves"))
     first, body = bundled.moves[0], bundled.start.body
-    shifted = Pose(body.position + [0.0, -0.02, 0.02], body.rotation)
+    shifted = Pose(body.position + np.array([0.0, -0.02, 0.02]), body.rotation)
     return replace(bundled, moves=(replace(first, body=shifted),))
 
 
@@ -103,7 +103,7 @@ def test_the_leaving_hand_opens_and_the_other_hands_stay(climb):
                 assert two.on_rock
             assert one.pose.position == pytest.approx(two.pose.position, abs=1e-9)
     swing = [knot for knot in climb.knots if knot.phase == "swing"]
-    leaving = [hand for hand in swing[-2].hands if hand.limb == "front_left"][0]
+    leaving = next(hand for hand in swing[-2].hands if hand.limb == "front_left")
     assert not leaving.on_rock
     assert not leaving.tensions.any()
     assert not leaving.wrench.any()
@@ -133,7 +133,8 @@ def least_utilisation(route, hands, moving, body, joints, tensions, wrench):
         carried = wrench_transport(into_body @ hand.pose)
         balance.append(carried @ space.generators)
         given = given - carried @ space.origin
-        fixed = dict(zip([f"{finger}/tension" for finger in FINGERS], tensions[hand.limb]))
+        names = [f"{finger}/tension" for finger in FINGERS]
+        fixed = dict(zip(names, tensions[hand.limb], strict=True))
         bounds += [(fixed.get(name), fixed.get(name)) for name in space.columns]
         before += len(space.columns)
     found = scipy.optimize.linprog(
@@ -220,3 +221,88 @@ def test_mass_leaves_the_straight_line_by_no_more_than_its_bound():
         most = mass_travel(robot, Load(), turn, first, last)
         assert off.max() <= most
         assert most <= (1.0 + 20.0 * size) * off.max() + 1e-9
+
+
+def test_tensions_change_by_no_more_than_the_limit(route, climb):
+    whole = [
+        max(np.abs(a.tensions - b.tensions).max() for a, b in zip(x.hands, y.hands, strict=True))
+        for x, y in zip(climb.knots[:-1], climb.knots[1:], strict=True)
+    ]
+    assert max(whole) > 20.0
+    small = plan_climb(replace(route, limits=Limits(tension_change=8.0)))
+    assert small.failure is None
+    for before, after in zip(small.knots[:-1], small.knots[1:], strict=True):
+        for one, two in zip(before.hands, after.hands, strict=True):
+            assert np.abs(one.tensions - two.tensions).max() <= 8.0 + 1e-6
+    assert len(small.knots) > len(climb.knots)
+    check_knots(small)
+    # what is put in between changes neither the other knots nor the time
+    assert small.knots[-1].time == pytest.approx(climb.knots[-1].time, rel=1e-6)
+    assert small.knots[-1].utilisation == pytest.approx(climb.knots[-1].utilisation, abs=1e-9)
+
+
+def test_a_move_of_the_whole_scene_changes_no_utilisation(route, climb):
+    turn = Rotation.from_rotvec([0.3, -0.5, 1.1]).as_matrix()
+    by = Pose(np.array([1.0, -2.0, 0.7]), turn)
+    hands = tuple(replace(hand, pose=by @ hand.pose) for hand in route.start.hands)
+    start = replace(
+        route.start, hands=hands, body=by @ route.start.body, gravity=turn @ route.start.gravity
+    )
+    (move,) = route.moves
+    moved = replace(move, hand=replace(move.hand, pose=by @ move.hand.pose), body=by @ move.body)
+    found = plan_climb(replace(route, start=start, moves=(moved,)))
+    assert [knot.phase for knot in found.knots] == [knot.phase for knot in climb.knots]
+    for here, there in zip(climb.knots, found.knots, strict=True):
+        assert there.utilisation == pytest.approx(here.utilisation, abs=1e-5)
+        assert there.time == pytest.approx(here.time, rel=1e-3)
+
+
+def test_a_climb_ends_at_the_move_that_has_no_plan(route, climb):
+    weak = plan_climb(replace(route, load=Load(mass=165.0)))
+    assert weak.failure.move == 1
+    assert weak.failure.phase in ("unload", "open")
+    assert weak.failure.limb == "front_left"
+    assert "would" in weak.failure.reason
+    assert weak.knots[-1].stage == 1
+    heavy = plan_climb(replace(route, load=Load(mass=400.0)))
+    assert (heavy.failure.move, heavy.failure.phase, heavy.knots) == (0, "start", ())
+
+
+def test_a_hold_out_of_reach_ends_the_climb_in_the_swing(route):
+    (move,) = route.moves
+    far = replace(move.hand, pose=Pose(move.hand.pose.position * 1.8, move.hand.pose.rotation))
+    found = plan_climb(replace(route, moves=(replace(move, hand=far),)))
+    assert (found.failure.phase, found.failure.limb) == ("swing", "front_left")
+    assert "out of reach by" in found.failure.reason
+    assert found.knots[-1].phase == "open"
+
+
+def test_a_link_in_the_way_is_named(route):
+    """A body so near the rock that links go through it."""
+    start = route.start
+    near = start.body.position + 0.3 * start.hands[0].pose.rotation[:, 2]
+    (move,) = route.moves
+    shifted = replace(move, body=Pose(near, start.body.rotation))
+    found = plan_climb(replace(route, moves=(shifted,)))
+    assert found.failure.phase == "shift"
+    assert found.failure.move == 1
+    assert len(found.knots) == 1
+
+
+def test_what_a_climb_cannot_have_is_refused(route):
+    floating = tuple(replace(hand, wrist="floating") for hand in route.start.hands)
+    with pytest.raises(UnsupportedError) as raised:
+        plan_climb(replace(route, start=replace(route.start, hands=floating)))
+    assert raised.value.field == "stance.hands[0].wrist"
+    with pytest.raises(UnsupportedError) as raised:
+        plan_climb(replace(route, load=Load(angular_acceleration=(0.1, 0.0, 0.0))))
+    assert raised.value.field == "load.angular_acceleration"
+    (move,) = route.moves
+    given = replace(move, joints={"rear_left": np.zeros(7)})
+    with pytest.raises(UnsupportedError) as raised:
+        plan_climb(replace(route, moves=(given,)))
+    assert raised.value.field == "moves[0].joints.rear_left"
+    air = replace(move.hand, hold_in_hand=Pose(np.array([0.0, 0.0, 0.5]), np.eye(3)))
+    with pytest.raises(InvalidInputError) as raised:
+        plan_climb(replace(route, moves=(replace(move, hand=air),)))
+    assert raised.value.field == "moves[0].hold"
