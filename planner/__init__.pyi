@@ -123,11 +123,13 @@ from .route import (
     Route as Route,
     RouteResult as RouteResult,
     RouteShare as RouteShare,
+    RouteStage as RouteStage,
     RouteSurvival as RouteSurvival,
     StageSurvival as StageSurvival,
     evaluate as evaluate,
     find_route_survival as find_route_survival,
     plan_climb as plan_climb,
+    stages as stages,
 )
 from .simulation import find_survival as find_survival
 from .solving import (

@@ -17,7 +17,7 @@ from planner.pictures.settings import PICTURE_SETTINGS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_com_region", "plot_com_region"]
+__all__ = ["axis_words", "draw_com_region", "plot_com_region"]
 
 
 def plot_com_region(
@@ -99,7 +99,7 @@ def draw_com_region(
         held = held and solid is not None and solid.margin >= 0.0
     mark, asked = "o" if held else "x", PICTURE_SETTINGS.asked
     axes.plot(*(region.axes @ region.com), mark, color=asked, label="centre of mass asked for")
-    across, up = (_way(axis) for axis in region.axes)
+    across, up = (axis_words(axis) for axis in region.axes)
     axes.set(xlabel=f"{across} of W [m]", ylabel=f"{up} of W [m]")
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.12)
@@ -132,7 +132,7 @@ def _draw_solid(axes: Axes, region: ComRegion, solid: ComSolid | None, accelerat
     )
 
 
-def _way(axis: Array) -> str:
+def axis_words(axis: Array) -> str:
     """Return the name of an axis of W with its sign, or the direction."""
     part = int(np.abs(axis).argmax())
     if np.allclose(np.abs(axis), np.eye(3)[part], rtol=0.0, atol=1e-9):

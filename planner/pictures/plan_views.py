@@ -291,8 +291,8 @@ class View:
         return np.concatenate(found) if found else np.zeros((0, 2))
 
 
-def draw_scene(view: View, scene: DrawnScene) -> None:
-    """Draw rock, hands, limbs, forces and names of a scene into a view."""
+def draw_scene(view: View, scene: DrawnScene, *, noted: bool = True) -> None:
+    """Draw rock, hands, limbs, forces and, if ``noted``, names and sizes of a scene into a view."""
     view.rock(np.concatenate([s.triangles for s in scene.surfaces if s.kind == "rock"]))
     for kind in ("palm", "link", "body"):
         drawn = [s.vertices for s in scene.surfaces if s.kind == kind]
@@ -311,8 +311,9 @@ def draw_scene(view: View, scene: DrawnScene) -> None:
             colour = UTILISATION_COLOURS(UTILISATION_NORM(dots.utilisations[i]))
             style = SCENE_STYLES[dots.kind] | {"color": colour, "mec": "0.2", "ms": 6}
             view.dots(dots.points[i : i + 1], **style)
-    _write_names(view, scene)
-    _draw_arrows(view, scene)
+    if noted:
+        _write_names(view, scene)
+    _draw_arrows(view, scene, noted)
     view.untangle()
 
 
@@ -354,7 +355,7 @@ def _write_names(view: View, scene: DrawnScene) -> None:
             view.note(label.text, middle, (-8.0, 6.0), bbox=None)
 
 
-def _draw_arrows(view: View, scene: DrawnScene) -> None:
+def _draw_arrows(view: View, scene: DrawnScene, noted: bool) -> None:
     """Draw forces of hands in the colours of their utilisation, and the load."""
     steps: dict[tuple[float, ...], Array] = {}
     tips, texts = [], []
@@ -363,6 +364,8 @@ def _draw_arrows(view: View, scene: DrawnScene) -> None:
         used = None if known is None else UTILISATION_COLOURS(UTILISATION_NORM(known))
         colour = used or PICTURE_SETTINGS.load
         begin, tip = view.arrow(arrow.start, scene.scale * arrow.force, colour)
+        if not noted:
+            continue
         if arrow.kind == "load":
             view.beyond(arrow.text, tip, tip - begin, color=PICTURE_SETTINGS.load)
             continue

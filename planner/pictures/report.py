@@ -6,16 +6,19 @@ import csv
 import json
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
-from msgspec.structs import asdict
+from msgspec import structs
 
 from hand_models.base import Array, whole_file
+from planner.pictures.climb_plots import draw_climb, draw_support
 from planner.result import SPREAD_SETTINGS, LimitName, Plan
-from planner.route import OutOfReach, RouteResult, RouteStage
+from planner.route import Climb, OutOfReach, RouteResult, RouteStage
 
 __all__ = ["draw_route", "summary", "write_report"]
 
@@ -27,7 +30,7 @@ PHASE_COLOURS: Final = {
 }
 
 
-def write_report(result: RouteResult, folder: Path) -> dict[str, Path]:
+def write_report(result: RouteResult, folder: Path, climb: Climb | None = None) -> dict[str, Path]:
     """Write ``stages.csv``, ``margin.png`` and ``summary.json`` into a folder.
 
     The margin of a stage is the cap on the utilisation minus the stage's utilisation.
@@ -38,11 +41,14 @@ def write_report(result: RouteResult, folder: Path) -> dict[str, Path]:
         Plans of all stages of the climb.
     folder : Path
         Created if missing; files of these names are replaced.
+    climb : Climb, optional
+        Knots of the climb; with them ``climb.png`` shows the robot and its margins along the time,
+        and ``support.png`` where the centre of mass may be and goes.
 
     Returns
     -------
     dict of str to Path
-        Files by the names ``table``, ``picture`` and ``summary``.
+        Files by the names ``table``, ``picture`` and ``summary``, ``climb`` and ``support``.
     """
     folder.mkdir(parents=True, exist_ok=True)
     files = {
@@ -58,21 +64,31 @@ def write_report(result: RouteResult, folder: Path) -> dict[str, Path]:
         writer = csv.DictWriter(stream, rows[0])
         writer.writeheader()
         writer.writerows(rows)
-    with whole_file(files["picture"]) as part:
-        draw_route(result).savefig(part, dpi=130, bbox_inches="tight", facecolor="white")
-    text = json.dumps(summary(result), indent=2, ensure_ascii=False)
+    pictures = {"picture": draw_route(result)}
+    if climb is not None and climb.knots:
+        files["climb"] = folder / "climb.png"
+        pictures["climb"] = draw_climb(climb, result)
+        if (support := draw_support(climb, result)) is not None:
+            files["support"] = folder / "support.png"
+            pictures["support"] = support
+    for name, figure in pictures.items():
+        with whole_file(files[name]) as part:
+            figure.savefig(part, dpi=130, bbox_inches="tight", facecolor="white")
+    text = json.dumps(summary(result, climb), indent=2, ensure_ascii=False)
     with whole_file(files["summary"]) as part:
         part.write_text(text + "\n", encoding="utf-8")
     return files
 
 
-def summary(result: RouteResult) -> dict[str, Any]:
+def summary(result: RouteResult, climb: Climb | None = None) -> dict[str, Any]:
     """Return the summary of a climb: statuses, the crux (its hardest stage), warnings and findings.
 
     Parameters
     ----------
     result : RouteResult
         Plans of all stages of the climb.
+    climb : Climb, optional
+        Knots of the climb; with them the summary has its moves, and why it fails.
 
     Returns
     -------
@@ -85,13 +101,38 @@ def summary(result: RouteResult) -> dict[str, Any]:
     return {
         "v": 1,
         "route": result.route.name,
+        "robot": result.route.start.robot.name,
         "feasible": result.feasible,
         "stages": len(statuses),
         "statuses": {status: statuses.count(status) for status in sorted(set(statuses))},
         "crux": {**_row(stage, plan), "sentence": _sentence(stage, plan)},
         "warnings": list(_warnings(result)),
         "findings": list(_findings(result)),
+        **({} if climb is None else {"climb": _climb(climb)}),
     }
+
+
+def _climb(climb: Climb) -> dict[str, Any]:
+    """Return the moves of a climb, the start among them, and why it ends early."""
+    failure = None if climb.failure is None else asdict(climb.failure)
+    rows, begun = [], 0.0
+    for _, group in groupby(climb.knots, key=lambda knot: knot.move):
+        knots = list(group)
+        most = max(knots, key=lambda knot: knot.utilisation)
+        rows.append(
+            {
+                "move": most.move,
+                "limb": most.limb,
+                "time": knots[-1].time - begun,
+                "knots": len(knots),
+                "utilisation": most.utilisation,
+                "bound": max((k.bound for k in knots if k.bound is not None), default=None),
+                "limiting": most.limiting and structs.asdict(most.limiting),
+                "complete": failure is None or failure["move"] != most.move,
+            }
+        )
+        begun = knots[-1].time
+    return {"knots": len(climb.knots), "time": begun, "moves": rows, "failure": failure}
 
 
 def _warnings(result: RouteResult) -> Iterator[str]:
@@ -122,7 +163,7 @@ def _findings(result: RouteResult) -> Iterator[dict[str, Any]]:
     """Yield the same structured, stage by stage; fields are those of each stage's question."""
     for stage, plan in zip(result.stages, result.plans, strict=True):
         for finding in plan.findings:
-            yield {"stage": stage.index, "move": stage.move, **asdict(finding)}
+            yield {"stage": stage.index, "move": stage.move, **structs.asdict(finding)}
 
 
 def _sentence(stage: RouteStage, plan: Plan | OutOfReach) -> str:

@@ -4,6 +4,7 @@ from .climb import (
     Route as Route,
     RouteResult as RouteResult,
     RouteStage as RouteStage,
+    stages as stages,
 )
 from .climbing import plan_climb as plan_climb
 from .evaluation import evaluate as evaluate
@@ -12,6 +13,7 @@ from .knots import (
     Failure as Failure,
     HandKnot as HandKnot,
     Knot as Knot,
+    KnotPhase as KnotPhase,
 )
 from .settings import ClimbSettings as ClimbSettings
 from .survival import (

@@ -146,6 +146,7 @@ class OutOfReach:
     load_factor_status: Literal["none"] = "none"
     limiting: None = None
     joint_utilisation: None = None
+    joints: None = None
     spread: None = None
     warnings: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from hand_models.base import InvalidInputError, errors_under
+from hand_models.base import Array, InvalidInputError, errors_under
 from planner.explanation import ONE_OF_A_PLAN
 from planner.prepare import settle_hand
 from planner.processes import by_index, cores
 from planner.result import Finding, Plan
 from planner.robots import UnreachableError
 from planner.route.climb import OutOfReach, Route, RouteResult, RouteStage, in_route, stages
+from planner.route.knots import Climb
 from planner.solving import plan
 
 __all__ = ["evaluate", "must_touch"]
@@ -22,6 +23,7 @@ def evaluate(
     route: Route,
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
+    climb: Climb | None = None,
 ) -> RouteResult:
     """Plan every stage of a route.
 
@@ -34,6 +36,8 @@ def evaluate(
         stages, else one. With one, this process plans all stages itself.
     progress : callable, optional
         Called after each stage with (number of stages planned, number of stages).
+    climb : Climb, optional
+        Knots of the same route: a stage that has a knot is planned with that knot's joint angles.
 
     Returns
     -------
@@ -46,7 +50,8 @@ def evaluate(
     InvalidInputError
         If a stance is not valid, or a move ends without contact; the field names the move.
     """
-    todo = tuple(stages(route))
+    found_joints = {} if climb is None else {k.stage: k.joints for k in climb.knots}
+    todo = tuple(_in_posture(each, found_joints.get(each.index)) for each in stages(route))
     if workers is None:
         # fewer stages are planned faster here than in processes that must first start
         workers = cores() if len(todo) >= 100 else 1
@@ -62,6 +67,14 @@ def evaluate(
     for kind in ONE_OF_A_PLAN:
         found = _said_once(found, kind)
     return RouteResult(route, todo, tuple(found))
+
+
+def _in_posture(stage: RouteStage, joints: Mapping[str, Array] | None) -> RouteStage:
+    """Return a stage with the joint angles of a climb, if the climb has come there."""
+    if joints is None:
+        return stage
+    stance = replace(stage.question.stance, joints=joints)
+    return replace(stage, question=replace(stage.question, stance=stance))
 
 
 def _said_once(plans: Sequence[Plan | OutOfReach], kind: str) -> list[Plan | OutOfReach]:

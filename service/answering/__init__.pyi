@@ -21,6 +21,10 @@ from .own_models import (
     with_hand as with_hand,
     with_robot as with_robot,
 )
-from .questions import question as question, route_of as route_of
+from .questions import (
+    question as question,
+    route_of as route_of,
+    stage_request as stage_request,
+)
 from .stances import stance as stance
 from .streams import Streams as Streams, opened as opened, set_points_reply as set_points_reply

@@ -11,7 +11,7 @@ import numpy as np
 from msgspec import UNSET, Struct, UnsetType
 from msgspec.structs import replace
 
-from hand_models.base import Array, Pose
+from hand_models.base import Array
 from hand_models.hand import Seating
 from hand_models.wrench_spaces import WrenchSpace
 from planner import Certificate, HandPlan, Palm, Plan, Question, Stance, WristPlan
@@ -329,23 +329,19 @@ def placed_poses(stance: Stance) -> dict[str, replies.PlacedFrame] | UnsetType:
         the request gives all hands by poses.
     """
     poses = {
-        hand.limb: _frame(hand.pose)
+        hand.limb: replies.PlacedFrame.of(hand.pose)
         for hand in stance.hands
         if hand.at is not None or hand.contact_offset is not None
     }
     return poses or UNSET
 
 
-def _frame(pose: Pose) -> replies.PlacedFrame:
-    return replies.PlacedFrame(
-        position=pose.position.tolist(), orientation=pose.quaternion().tolist()
-    )
-
-
 def seating_reply(seating: Seating) -> replies.SeatingReply:
     """Convert the pose of a hold in the hand frame H, and the rule that chose it, into a reply."""
     return replies.SeatingReply(
-        rule=seating.rule, pose=_frame(seating.pose), backed_off=float(seating.backed_off)
+        rule=seating.rule,
+        pose=replies.PlacedFrame.of(seating.pose),
+        backed_off=float(seating.backed_off),
     )
 
 

@@ -178,10 +178,6 @@ def _diagnosis(asked: DiagnosisRequest, robots: Robots, _: Streams) -> Reply:
     return answer_diagnosis(asked, robots)
 
 
-def _climb(asked: RouteRequest, robots: Robots, _: Streams) -> Reply:
-    return climb(asked, robots)
-
-
 class _Service(NamedTuple):
     """Kind of request, and the function of request, robots and streams that answers it."""
 
@@ -194,6 +190,7 @@ SERVICES_BY_NAME: Final[dict[str, _Service]] = {
     ServiceName.WRENCH_SPACE: _Service(WrenchSpaceRequest, _wrench_space),
     ServiceName.BODY_SPACE: _Service(BodySpaceRequest, _body_space),
     ServiceName.DIAGNOSIS: _Service(DiagnosisRequest, _diagnosis),
+    ServiceName.ROUTE: _Service(RouteRequest, lambda asked, robots, _: climb(asked, robots)),
     ServiceName.STREAM: _Service(
         StreamRequest, lambda asked, robots, streams: streams.declare(asked, robots)
     ),
@@ -221,7 +218,7 @@ def handle(
     Parameters
     ----------
     key : str
-        Zenoh key. Its last part names one of `SERVICES_BY_NAME`, or is ``route``.
+        Zenoh key. Its last part names one of `SERVICES_BY_NAME`.
     payload : bytes
         Encoded request.
     encoding : str, optional
@@ -263,10 +260,7 @@ def handle(
     try:
         form = Format.named(encoding)
         name = key.rpartition("/")[2]
-        # only bulk work has routes
-        service = (
-            _Service(RouteRequest, _climb) if name == ServiceName.ROUTE else SERVICES_BY_NAME[name]
-        )
+        service = SERVICES_BY_NAME[name]
         kind = service.request
         request: Any = decode_request(payload, kind, form)
         if files is not None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from msgspec import UNSET, structs
 
-from hand_models.base import InvalidInputError, errors_under
+from hand_models.base import Array, InvalidInputError, errors_under
 from hand_models.parameters import ParameterSample, own_draw
 from planner import Load, Question
 from service import requests
@@ -20,12 +21,12 @@ from service.answering.stances import (
     stance,
     with_rocks,
 )
-from service.replies import RouteReply, RouteStageReply
+from service.replies import ClimbFailureReply, KnotReply, RouteReply, RouteStageReply
 
 if TYPE_CHECKING:
-    from planner import Route
+    from planner import Route, RouteStage
 
-__all__ = ["climb", "question", "route_of"]
+__all__ = ["climb", "question", "route_of", "stage_request"]
 
 
 def question(request: requests.PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Question:
@@ -110,9 +111,61 @@ def route_of(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) ->
         limits=request.limits,
         objective=request.objective,
         explain=request.explain,
-        want=frozenset(request.want),
+        want=frozenset(want for want in request.want if want != "trajectory"),
         draws=_draws(request.draws),
     )
+
+
+def stage_request(
+    request: requests.RouteRequest, stage: RouteStage, joints: Mapping[str, Array] | None = None
+) -> requests.PlanRequest:
+    """Return the plan request of one stage of a route, whose plan is that of the stage.
+
+    Parameters
+    ----------
+    request : RouteRequest
+        The route.
+    stage : RouteStage
+        A stage of that route.
+    joints : mapping of str to ndarray, optional
+        Joint angles of the limbs that were planned with [rad]. Without them those of the stage's
+        question, which may be ``solve``.
+
+    Returns
+    -------
+    PlanRequest
+        Hands, holds, body, joints, load and limits of the stage; it wants the load factor.
+    """
+    hands, body = {hand.limb: hand for hand in request.stance.hands}, request.stance.body
+    for number, move in enumerate(request.moves[: stage.move], start=1):
+        body = move.body or body
+        if number < stage.move or stage.phase == "place":
+            fields = {name: getattr(move, name) for name in requests.Hand.__struct_fields__}
+            hands[move.limb] = requests.Hand(**fields)
+    asked = stage.question
+    angles = asked.stance.joints if joints is None else joints
+    stance = structs.replace(
+        request.stance,
+        hands=[hands[hand.limb] for hand in asked.stance.hands],
+        body=body,
+        joints=angles if angles is None or isinstance(angles, str) else _lists(angles),
+    )
+    return requests.PlanRequest(
+        v=1,
+        stance=stance,
+        load=request.load,
+        objective=request.objective,
+        limits=asked.limits,
+        explain=request.explain,
+        want=["load_factor", *(want for want in request.want if want != "trajectory")],
+        draws=request.draws,
+    )
+
+
+def _lists(
+    angles: Mapping[str, Array | Literal["solve"]],
+) -> dict[str, list[float] | Literal["solve"]]:
+    return {limb: each if isinstance(each, str) else each.tolist() for limb, each in angles.items()}
 
 
 def _draws(messages: Sequence[requests.Draw]) -> tuple[ParameterSample, ...] | None:
@@ -138,16 +191,19 @@ def climb(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> Ro
     Returns
     -------
     RouteReply
-        Status and numbers of each stage, and the index of the crux, the hardest stage.
+        Status and numbers of each stage, and the index of the crux, the hardest stage; if wanted,
+        the trajectory, with whose joint angles the stages are planned.
 
     Raises
     ------
     InvalidInputError
         If the route is impossible. The error's ``field`` is a path in the request.
     """
-    from planner import evaluate
+    from planner import evaluate, plan_climb
 
-    result = evaluate(route_of(request, robots), workers=1)
+    route = route_of(request, robots)
+    found = plan_climb(route) if "trajectory" in request.want else None
+    result = evaluate(route, workers=1, climb=found)
     crux = result.plans[result.crux]
     return RouteReply(
         id=request.id,
@@ -176,4 +232,6 @@ def climb(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> Ro
             for stage, plan in zip(result.stages, result.plans, strict=True)
         ],
         warnings=list(dict.fromkeys(text for p in result.plans for text in p.warnings)),
+        trajectory=UNSET if found is None else [KnotReply.of(knot) for knot in found.knots],
+        failure=UNSET if found is None else ClimbFailureReply.of(found.failure),
     )

@@ -83,7 +83,7 @@ def _with_less_in_it(reply: Reply, bare: Reply) -> Iterator[tuple[str, Reply]]:
     ``bare``: the reply without the model, or the same reply if it has no model.
     """
     wanted = {"spread", "advice", "robust", "open_loop", "clearance", "redundancy", "survival"}
-    wanted |= {"com_region", "prices"}
+    wanted |= {"com_region", "prices", "trajectory"}
     wanted |= {"vertices", "half_spaces"}
     blank: dict[str, Any] = {
         field.name: None if field.default is NODEFAULT else field.default

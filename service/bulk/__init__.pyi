@@ -25,3 +25,9 @@ from .pools import (
 )
 from .runs import ReplyLines as ReplyLines, Run as Run, TableLines as TableLines
 from .tally import Tally as Tally
+from .trajectories import (
+    ClimbSummary as ClimbSummary,
+    read_climb_summary as read_climb_summary,
+    read_trajectory as read_trajectory,
+    write_trajectory as write_trajectory,
+)

@@ -16,7 +16,15 @@ from hand_models.hand import FINGERS
 from planner import LimitName
 from service.replies import WRENCH_AXES, ErrorDetail
 
-__all__ = ["Column", "TableRow", "chosen_columns", "columns_of", "route_columns", "row_of"]
+__all__ = [
+    "Column",
+    "TableRow",
+    "chosen_columns",
+    "columns_of",
+    "route_columns",
+    "row_of",
+    "value_at",
+]
 
 Kind = Literal["int", "float", "bool", "text"]
 
@@ -233,7 +241,11 @@ def row_of(payload: bytes, columns: Sequence[Column]) -> TableRow:
     error = reply.get("error")
     values = _readable(reply)
     return TableRow(
-        [_at(values, column.path or (column.name,)) for column in columns if not column.is_index],
+        [
+            value_at(values, column.path or (column.name,))
+            for column in columns
+            if not column.is_index
+        ],
         reply.get("status"),
         None if error is None else msgspec.convert(error, ErrorDetail),
     )
@@ -260,8 +272,8 @@ def _readable(reply: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _at(value: Any, path: tuple[str | int, ...]) -> Any:
-    """Return what is at the end of a path; None where a part of it is missing."""
+def value_at(value: Any, path: tuple[str | int, ...]) -> Any:
+    """Return what is at the end of a path of keys and indices; None if a part of it is missing."""
     try:
         for step in path:
             value = value[step]

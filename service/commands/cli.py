@@ -61,6 +61,10 @@ COMMANDS_BY_NAME: Final = {
         "Write a commented start of a stance, a route, a robot or a hand, as TOML that runs.",
     ),
     "plan": Entry("plans", "Make one plan, without the network."),
+    "play": Entry(
+        "network",
+        "Send the set-points of a climb to a robot: publish them in time, until the end or Ctrl-C.",
+    ),
     "query": Entry("network", "Ask a running service for a plan."),
     "redundancy": Entry(
         "plans",
@@ -253,9 +257,9 @@ def crux() -> None:
     STANCE is the path of a JSON or TOML file with a plan request, - for standard input, or the name
     of a bundled stance: boulders, ledge, overhang, slab, wall, wall-300, wall-300-floating,
     wall-300-joints, wall-700.
-    ROUTE is the same for a climb; six-moves is bundled. LIMB is front_right, rear_right, rear_left
-    or front_left. --hand FILE puts numbers of your own in place of the bundled hand's, --robot FILE
-    a robot of your own in place of RoboSimian.
+    ROUTE is the same for a climb; mars-slab and six-moves are bundled. LIMB is front_right,
+    rear_right, rear_left or front_left. --hand FILE puts numbers of your own in place of the
+    bundled hand's, --robot FILE a robot of your own in place of RoboSimian.
 
     Exit status: 0 done and feasible, 3 done but overloaded or infeasible, 2 bad input (one line on
     standard error names the field), 1 anything else.

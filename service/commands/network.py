@@ -1,4 +1,4 @@
-"""Define the commands that serve and ask over zenoh: serve, query, demo and schema."""
+"""Define the commands that serve, ask and publish over zenoh: serve, query, play, demo, schema."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any
 import click
 import msgspec
 
-from service import answering, processes, requests, serving, tables, wire
+from hand_models.base import InvalidInputError
+from service import answering, bulk, processes, requests, serving, tables, wire
 from service.commands import options, stances
 
 if TYPE_CHECKING:
     import zenoh
 
-__all__ = ["demo_command", "query_command", "schema_command", "serve_command"]
+__all__ = ["demo_command", "play_command", "query_command", "schema_command", "serve_command"]
 
 
 def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -190,6 +191,66 @@ def query_command(
     with serving.CruxClient(config, name, timeout=timeout, wait=wait) as client:
         reply = client.plan(request)
     return tables.show(reply, as_json)
+
+
+@click.command("play")
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@zenoh_options
+@click.option(
+    "--rate",
+    type=options.FiniteRange(1.0, 1e4),
+    default=100.0,
+    show_default=True,
+    metavar="HZ",
+    help="Least number of set-points in a second.",
+)
+@click.option(
+    "--speed",
+    type=options.FiniteRange(0.0, min_open=True, max=100.0),
+    default=1.0,
+    show_default=True,
+    help="Time of the climb over time that passes; 1 keeps the controller's rates.",
+)
+@click.option("--up-to-failure", is_flag=True, help="Play a climb that ends in the middle, too.")
+@options.wait_option
+@options.json_option
+def play_command(
+    folder: Path,
+    config: zenoh.Config,
+    rate: float,
+    speed: float,
+    up_to_failure: bool,
+    wait: float | None,
+    as_json: bool,
+) -> None:
+    """Send the set-points of a climb to a robot: publish them in time, until the end or Ctrl-C.
+
+    DIR is what crux route has written. Between knots, set-points are interpolated. Each is a
+    message at crux/<robot>/play; the last one comes again with the state done, or stopped. The
+    robot has to be at the start of the climb.
+    """
+    knots, about = bulk.read_trajectory(folder), bulk.read_climb_summary(folder)
+    failure = about.climb.failure
+    if failure is not None and not up_to_failure:
+        raise InvalidInputError(
+            f"{folder}: the climb fails in move {failure.move} ({failure.phase}): "
+            f"{failure.reason}; --up-to-failure plays what comes before",
+            field="DIR",
+        )
+    if unsure := [knot.index for knot in knots if not knot.verified]:
+        raise InvalidInputError(f"{folder}: knot {unsure[0]} is not verified", field="DIR")
+    duration = knots[-1].time - knots[0].time
+    if not as_json:
+        tables.remark(f"playing {about.route}: {len(knots)} knots in {duration / speed:.1f} s")
+        if speed > 1.0:
+            tables.note(f"at speed {speed:g}, tensions and joints exceed the controller's rates")
+    serving.start_zenoh_log()
+    with serving.open_session(config) as session:
+        sent = serving.play(session, about.robot, knots, rate=rate, speed=speed, wait=wait)
+    if as_json:
+        tables.say({"v": 1, "set_points": sent, "knots": len(knots), "time": duration})
+    else:
+        tables.console().print(f"{sent} set-points of {len(knots)} knots were published")
 
 
 @click.command("demo")

@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import click
 import msgspec
 
 import planner
-from hand_models.base import CruxError, InvalidInputError
-from service import answering, bulk, requests, tables, wire
+from hand_models.base import (
+    Array,
+    CruxError,
+    InvalidInputError,
+    UnsupportedError,
+    to_install,
+    whole_file,
+)
+from service import answering, bulk, replies, requests, tables, wire
 from service.commands import options, stances
 from service.commands.batch import answer_rest, complain, exit_status, new_run
 
@@ -31,10 +39,17 @@ LISTED_ENDINGS: Final = ".jsonl or .csv or .parquet"
     "-o",
     "--output",
     type=click.Path(path_type=Path),
-    required=True,
     metavar="DIR",
-    help="Where the table, the picture and the summary of one route go; or of any number of routes "
-    f"a file that ends in {LISTED_ENDINGS}: the replies, one a line, or a table.",
+    help="Where tables, stances, pictures and the trajectory of one route go; or of any number of "
+    f"routes a file that ends in {LISTED_ENDINGS}: the replies, one a line, or a table; with "
+    "--stage a file that ends in .json: the stance.",
+)
+@click.option(
+    "--stage",
+    "index",
+    type=click.IntRange(min=0),
+    metavar="K",
+    help="Print the plan of one stage of a route, from zero, as crux plan does.",
 )
 @click.option(
     "--resume",
@@ -48,7 +63,8 @@ LISTED_ENDINGS: Final = ".jsonl or .csv or .parquet"
 @options.json_option
 def route_command(
     routes: tuple[str, ...],
-    output: Path,
+    output: Path | None,
+    index: int | None,
     resume: bool,
     parallel: options.WorkersOption,
     wanted: options.Wanted,
@@ -63,6 +79,10 @@ def route_command(
 
     The exit status of many routes is the worst that one of them has, as for crux batch.
     """
+    if index is not None:
+        return _stage(_Asked.of(routes, wanted, own), index, output, own, as_json)
+    if output is None:
+        raise InvalidInputError("missing: give -o DIR, or --stage K of one route", field="-o")
     if output.suffix.lower() in {".jsonl", ".csv", ".parquet"}:
         for option, asked_for in (("--spread", wanted.spread), ("--draws", wanted.draws)):
             if asked_for:
@@ -81,33 +101,122 @@ def route_command(
         raise InvalidInputError(
             f"{output}: must be a folder, or end in {LISTED_ENDINGS}", field="-o"
         )
-    request = wanted.of(own.asked(stances.read_route(routes[0])))
-    return _one(request, output, parallel.workers, own, as_json)
+    return _one(_Asked.of(routes, wanted, own), output, parallel.workers, own, as_json)
+
+
+class _Asked(NamedTuple):
+    """A route request with its meshes, and as its file has it, which names mesh files."""
+
+    request: requests.RouteRequest
+    given: stances.Given[requests.RouteRequest]
+
+    @classmethod
+    def of(cls, routes: Sequence[str], wanted: options.Wanted, own: options.Own) -> _Asked:
+        """Read the one route that is named, with the options of the command."""
+        if len(routes) > 1:
+            raise InvalidInputError("is for one route", field="--stage")
+        request, given = stances.read_route_with_text(routes[0])
+        return cls(wanted.of(own.asked(request)), given)
+
+    def stage(
+        self,
+        stage: planner.RouteStage,
+        joints: Mapping[str, Array] | None,
+        folder: Path | None = None,
+    ) -> requests.PlanRequest:
+        """Return the plan request of a stage; for a file in a folder, with names of mesh files."""
+        found = answering.stage_request(self.request, stage, joints)
+        if folder is None or self.given.files is None:
+            return found
+        named = answering.stage_request(self.given.request, stage, joints)
+        return self.given.files.named(found, named, folder)
 
 
 def _one(
-    request: requests.RouteRequest,
+    asked: _Asked,
     folder: Path,
     workers: int | None,
     own: options.Own,
     as_json: bool,
 ) -> int:
     """Evaluate one route, and write its report."""
-    climb = answering.route_of(request, own.robots)
+    route = answering.route_of(asked.request, own.robots)
     with tables.filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
     tables.write_alone(folder / "route", folder)
-    with tables.progress(f"planning {climb.name}") as report:
-        result = planner.evaluate(climb, workers, report)
+    with tables.progress(f"planning the moves of {route.name}") as report:
+        climb = _climb(route, report)
+    with tables.progress(f"planning {route.name}") as report:
+        result = planner.evaluate(route, workers, report, climb)
     with tables.filling_folder():
-        files = planner.write_report(result, folder)
+        files = planner.write_report(result, folder, climb)
+        knots = [] if climb is None else [replies.KnotReply.of(knot) for knot in climb.knots]
+        files |= bulk.write_trajectory(knots, folder)
+        files["stances"] = _write_stages(asked, result, folder / "stages")
     if as_json:
         tables.say(
-            planner.summary(result) | {"files": {name: str(path) for name, path in files.items()}}
+            planner.summary(result, climb)
+            | {"files": {name: str(path) for name, path in files.items()}}
         )
     else:
-        tables.print_route(result, files, tables.console())
-    return tables.ExitStatus.of(result.status)
+        tables.print_route(result, files, tables.console(), climb)
+        if knots and "trajectory table" not in files:
+            tables.remark(f"for the trajectory as a table: {to_install('parquet')}")
+    failed = climb is not None and climb.failure is not None
+    status = tables.ExitStatus.of(result.status)
+    return tables.ExitStatus.OVERLOADED if failed and status == tables.ExitStatus.DONE else status
+
+
+def _climb(
+    route: planner.Route, report: Callable[[int, int], None] | None = None
+) -> planner.Climb | None:
+    """Plan the moves of a route; say so if these cannot be planned for what the route has."""
+    try:
+        return planner.plan_climb(route, progress=report)
+    except UnsupportedError as error:
+        tables.remark(f"no trajectory: {error}")
+        return None
+
+
+def _write_stages(asked: _Asked, result: planner.RouteResult, folder: Path) -> Path:
+    """Write each stage as a stance of its own; return the folder."""
+    folder.mkdir(exist_ok=True)
+    for old in folder.glob("*.json"):
+        if old.name.partition("-")[0].isdecimal():
+            old.unlink()
+    for stage, answer in zip(result.stages, result.plans, strict=True):
+        name = "-".join(filter(None, (f"{stage.index:02d}", stage.phase, stage.limb)))
+        request = asked.stage(stage, answer.joints, folder)
+        _write_stance(request, folder / f"{name}.json")
+    return folder
+
+
+def _write_stance(request: requests.PlanRequest, file: Path) -> None:
+    with whole_file(file) as part:
+        part.write_bytes(msgspec.json.format(msgspec.json.encode(request)))
+
+
+def _stage(asked: _Asked, index: int, file: Path | None, own: options.Own, as_json: bool) -> int:
+    """Print the plan of one stage, and write its stance."""
+    if file is not None and file.suffix.lower() != ".json":
+        raise InvalidInputError(f"{file}: must end in .json with --stage", field="-o")
+    route = answering.route_of(asked.request, own.robots)
+    known = tuple(planner.stages(route))
+    if index >= len(known):
+        raise InvalidInputError(
+            f"must be below {len(known)}, the number of stages, got {index}", field="--stage"
+        )
+    stage = known[index]
+    with tables.working(f"planning the moves of {route.name} up to stage {index}"):
+        climb = _climb(replace(route, moves=route.moves[: stage.move]))
+    knots = () if climb is None else climb.knots
+    joints = next((knot.joints for knot in knots if knot.stage == index), None)
+    request = options.with_extras(asked.stage(stage, joints), whole=not as_json)
+    answer = answering.planned(request, own.robots)
+    if file is not None:
+        with tables.writing(file):
+            _write_stance(asked.stage(stage, joints or answer.plan.joints, file.parent), file)
+    return tables.show(answer.reply, as_json)
 
 
 class _Routes:

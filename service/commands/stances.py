@@ -25,6 +25,7 @@ __all__ = [
     "limbs_of",
     "read_request",
     "read_route",
+    "read_route_with_text",
     "read_stance_or_route",
     "read_with_text",
 ]
@@ -114,7 +115,14 @@ def read_route(source: str) -> requests.RouteRequest:
     InvalidInputError
         If the source does not exist or cannot be read, or is not a valid route request.
     """
-    return _read(source, requests.RouteRequest, "ROUTE", "route")[0]
+    return read_route_with_text(source)[0]
+
+
+def read_route_with_text(
+    source: str,
+) -> tuple[requests.RouteRequest, Given[requests.RouteRequest]]:
+    """Read a route request as `read_route` does, and return it as the user wrote it as well."""
+    return _read(source, requests.RouteRequest, "ROUTE", "route")
 
 
 def read_stance_or_route(source: str) -> requests.PlanRequest | requests.RouteRequest:

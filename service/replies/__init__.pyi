@@ -1,3 +1,9 @@
+from .climb import (
+    ClimbFailureReply as ClimbFailureReply,
+    ClimbSetPoints as ClimbSetPoints,
+    HandKnotReply as HandKnotReply,
+    KnotReply as KnotReply,
+)
 from .diagnosis import DiagnosisReply as DiagnosisReply, SuspectReply as SuspectReply
 from .plan import (
     BriefPlanReply as BriefPlanReply,

@@ -24,6 +24,7 @@ from planner import (
     TensionPath,
     Time,
 )
+from service.replies.climb import ClimbFailureReply, KnotReply
 from service.replies.reply import Reply, SeatingReply, StanceReply, Vector, WrenchSet, Wrist
 from service.replies.spaces import ComRegionReply
 
@@ -325,6 +326,10 @@ class RouteReply(Reply, kw_only=True):
       plan.
     - ``stages``: all stances in climbing order.
     - ``warnings``: sentences about what is odd about any stage, each once.
+    - ``trajectory``: knots of the climb in order, up to the move that fails; left out unless
+      wanted.
+    - ``failure``: why the climb ends in the middle of a move; null where it runs from end to end,
+      left out without ``trajectory``.
     """
 
     name: str
@@ -337,3 +342,5 @@ class RouteReply(Reply, kw_only=True):
     limiting: LimitName | None
     stages: list[RouteStageReply]
     warnings: list[str]
+    trajectory: list[KnotReply] | UnsetType = UNSET
+    failure: ClimbFailureReply | UnsetType | None = UNSET

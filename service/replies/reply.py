@@ -8,9 +8,12 @@ does not exist is null; a result that the request does not name in ``want`` is l
 
 from __future__ import annotations
 
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal, Self
 
 from msgspec import UNSET, Struct, UnsetType
+
+if TYPE_CHECKING:
+    from hand_models.base import Pose
 
 __all__ = [
     "WRENCH_AXES",
@@ -56,6 +59,11 @@ class PlacedFrame(Struct):
 
     position: Vector
     orientation: Vector
+
+    @classmethod
+    def of(cls, pose: Pose) -> Self:
+        """Convert a pose from arrays to lists."""
+        return cls(pose.position.tolist(), pose.quaternion().tolist())
 
 
 class StanceReply(Reply, kw_only=True):

@@ -27,7 +27,6 @@ from service.requests.request import (
     Later,
     Pose,
     Query,
-    Request,
     Tensions,
     Wrench,
 )
@@ -353,10 +352,9 @@ class Move(Hand, frozen=True, kw_only=True):
     ] = "solve"
 
 
-class RouteRequest(Request, frozen=True, kw_only=True):
-    """Request for a climb: a start stance, and moves; for bulk work, not over zenoh.
+class RouteRequest(Query, frozen=True, kw_only=True):
+    """Request for a climb: a start stance, and moves. It takes as long as many plans.
 
-    - ``id``: text of the client's choice, which the reply repeats.
     - ``name``: name of the route.
     - ``stance``: the start stance.
     - ``load``: mass and payloads from which the body wrench of every stance follows.
@@ -364,12 +362,11 @@ class RouteRequest(Request, frozen=True, kw_only=True):
     - ``limits``: the cap on the utilisation, and the caller's own limits, for every stance.
     - ``moves``: the moves in climbing order.
     - ``explain``: false leaves out the certificates of stances that are overloaded or infeasible.
-    - ``want``: names of further results for every stance.
+    - ``want``: names of further results: ``spread`` of every stance, and ``trajectory``.
     - ``draws``: samples of uncertain parameters for the spread and ``max_robust``; by default the
       bundled samples.
     """
 
-    id: Identifier | None = None
     name: Identifier = "route"
     stance: Stance
     load: Load | None = None
@@ -378,7 +375,10 @@ class RouteRequest(Request, frozen=True, kw_only=True):
     moves: Annotated[list[Move], Meta(max_length=10_000)]
     explain: Explain = True
     want: Annotated[
-        list[Literal["spread"]],
-        Meta(description="of every stance, beside its load factor: as in a plan's request"),
+        list[Literal["spread", "trajectory"]],
+        Meta(
+            description="spread: of every stance, as in a plan's request. trajectory: how the "
+            "robot moves between the stances: the knots of the climb"
+        ),
     ] = []
     draws: Draws = []

@@ -10,5 +10,6 @@ from .config import (
     zenoh_config as zenoh_config,
 )
 from .log_lines import JsonLines as JsonLines, LogThread as LogThread
+from .player import climb_set_points as climb_set_points, play as play
 from .server import PlanService as PlanService
 from .settings import SERVING_SETTINGS as SERVING_SETTINGS

@@ -22,6 +22,7 @@ from service.replies import (
     ErrorReply,
     PlanReply,
     Reply,
+    RouteReply,
     SetPointsReply,
     StreamReply,
     WrenchSpaceReply,
@@ -32,6 +33,7 @@ from service.requests import (
     DiagnosisRequest,
     PlanRequest,
     Query,
+    RouteRequest,
     SetPointsRequest,
     StreamRequest,
     WrenchSpaceRequest,
@@ -219,6 +221,13 @@ class CruxClient:
         Raises the errors that `plan` raises.
         """
         return _read(self._ask(ServiceName.BODY_SPACE, request), BodySpaceReply)
+
+    def route(self, request: RouteRequest) -> RouteReply:
+        """Send a request for a climb and return its stages, and the trajectory if it is wanted.
+
+        Raises the errors that `plan` raises.
+        """
+        return _read(self._ask(ServiceName.ROUTE, request), RouteReply)
 
     def stream(self, request: StreamRequest) -> StreamReply:
         """Declare a stance as a stream of body wrenches; the reply has the stream's identifier.

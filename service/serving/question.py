@@ -187,7 +187,7 @@ def received_question(
         payload=payload,
         encoding="" if query.encoding is None else str(query.encoding),
         seconds=longest,
-        dear=name in (ServiceName.WRENCH_SPACE, ServiceName.BODY_SPACE)
+        dear=name in (ServiceName.WRENCH_SPACE, ServiceName.BODY_SPACE, ServiceName.ROUTE)
         or len(payload) > SERVING_SETTINGS.large_payload,
         fault=fault,
         secret=secret,

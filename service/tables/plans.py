@@ -313,8 +313,13 @@ def _print_clearance(clearance: planner.Clearance, out: Console) -> None:
         out.print(f"not measured: {missing}")
 
 
-def print_route(result: planner.RouteResult, files: Mapping[str, Path], out: Console) -> None:
-    """Print a route: status and utilisation of each stage, the crux, and the written files.
+def print_route(
+    result: planner.RouteResult,
+    files: Mapping[str, Path],
+    out: Console,
+    climb: planner.Climb | None = None,
+) -> None:
+    """Print a route: each stage, each move and what fails, the crux, and the written files.
 
     Parameters
     ----------
@@ -324,6 +329,8 @@ def print_route(result: planner.RouteResult, files: Mapping[str, Path], out: Con
         Written files, by what they contain.
     out : Console
         Console to print on.
+    climb : Climb, optional
+        Knots of the climb, for its moves.
     """
     out.print(Text.assemble((result.route.name, "bold"), f": {len(result.route.moves)} moves"))
     numbers = {"util": "utilisation", "load factor": "load_factor", "joints": "joint_utilisation"}
@@ -339,8 +346,32 @@ def print_route(result: planner.RouteResult, files: Mapping[str, Path], out: Con
     print_rows(
         stages, columns, out, style=lambda row: "bold" if row[0].index == result.crux else ""
     )
-    summary = planner.summary(result)
+    summary = planner.summary(result, climb)
+    if climb is not None:
+        _print_moves(summary["climb"], out)
     print_warnings(summary["warnings"], out)
     out.print(summary["crux"]["sentence"])
     for what, path in files.items():
         out.print(f"{what}: {path}", soft_wrap=True)
+
+
+def _print_moves(climb: Mapping[str, Any], out: Console) -> None:
+    """Print the moves of a climb's summary, and why it fails."""
+
+    def limit(row: Mapping[str, Any]) -> str | None:
+        return " ".join(filter(None, (row["limiting"] or {}).values())) or None
+
+    columns = (
+        name("move", lambda row: str(row["move"] or "start")),
+        name("limb"),
+        number("time [s]", "time", ".1f"),
+        number("knots"),
+        number("util", "utilisation", ".2f"),
+        number("bound", "bound", ".2f"),
+        text("limited by", limit),
+    )
+    title = f"moves: {climb['knots']} knots in {climb['time']:.1f} s"
+    print_rows(climb["moves"], columns, out, title)
+    if (failure := climb["failure"]) is not None:
+        what = f"move {failure['move']} fails ({failure['phase']})"
+        out.print(Text.assemble((f"{what}:", "bold red"), f" {failure['reason']}"))

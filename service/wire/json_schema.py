@@ -11,6 +11,7 @@ from hand_models.parameters import Quantity
 from service.replies import (
     BodySpaceReply,
     BriefPlanReply,
+    ClimbSetPoints,
     DiagnosisReply,
     ErrorReply,
     HealthReply,
@@ -50,6 +51,7 @@ MESSAGE_KINDS: Final[tuple[type[msgspec.Struct], ...]] = (
     DiagnosisReply,
     RouteRequest,
     RouteReply,
+    ClimbSetPoints,
     HealthReply,
     ErrorReply,
 )
@@ -63,7 +65,7 @@ def schema() -> dict[str, Any]:
     dict
         The schema, draft 2020-12. Besides ``$defs`` with all types, the entry ``keys`` has the
         types of request, reply and error for each zenoh key; the request is null for a key that
-        takes none.
+        takes none. A key at which messages are only published has the type ``published``.
     """
     wholes, parts = msgspec.json.schema_components(
         (*MESSAGE_KINDS, Quantity), ref_template="#/$defs/{name}"
@@ -87,13 +89,15 @@ def schema() -> dict[str, Any]:
         ServiceName.STREAM: (StreamRequest, StreamReply),
         ServiceName.SET_POINTS: (SetPointsRequest, SetPointsReply),
         ServiceName.DIAGNOSIS: (DiagnosisRequest, DiagnosisReply),
+        ServiceName.ROUTE: (RouteRequest, RouteReply),
         ServiceName.HEALTH: (None, HealthReply),
     }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Messages of crux, version 1",
         "anyOf": list(wholes[: len(MESSAGE_KINDS)]),
-        "keys": {service_key("<robot>", name): _exchange(*each) for name, each in keys.items()},
+        "keys": {service_key("<robot>", name): _exchange(*each) for name, each in keys.items()}
+        | {service_key("<robot>", ServiceName.PLAY): {"published": _reference(ClimbSetPoints)}},
         "$defs": {names[name]: _renamed(part, names) for name, part in parts.items()},
     }
 
@@ -134,9 +138,13 @@ def _renamed(part: Any, names: Mapping[str, str]) -> Any:
 def _exchange(
     request: type[msgspec.Struct] | None, *replies: type[msgspec.Struct]
 ) -> dict[str, Any]:
-    references = [{"$ref": f"#/$defs/{reply.__name__}"} for reply in replies]
+    references = [_reference(reply) for reply in replies]
     return {
-        "request": None if request is None else {"$ref": f"#/$defs/{request.__name__}"},
+        "request": None if request is None else _reference(request),
         "reply": references[0] if len(references) == 1 else {"anyOf": references},
-        "error": {"$ref": f"#/$defs/{ErrorReply.__name__}"},
+        "error": _reference(ErrorReply),
     }
+
+
+def _reference(kind: type[msgspec.Struct]) -> dict[str, str]:
+    return {"$ref": f"#/$defs/{kind.__name__}"}

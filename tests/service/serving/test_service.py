@@ -53,7 +53,8 @@ BODY_SPACE = service_key("robosimian", "body_space")
 STREAM = service_key("robosimian", "stream")
 SET_POINTS = service_key("robosimian", "set_points")
 DIAGNOSIS = service_key("robosimian", "diagnosis")
-KEYS = [PLAN, WRENCH_SPACE, BODY_SPACE, DIAGNOSIS, STREAM, SET_POINTS]
+ROUTE = service_key("robosimian", "route")
+KEYS = [PLAN, WRENCH_SPACE, BODY_SPACE, DIAGNOSIS, ROUTE, STREAM, SET_POINTS]
 
 
 @pytest.fixture(scope="module")

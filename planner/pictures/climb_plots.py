@@ -1,0 +1,246 @@
+"""Pictures of a climb: the robot at each stage, margins along the time, and support regions."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import groupby, pairwise
+from typing import Any, get_args
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from hand_models.base import Array, InvalidInputError
+from planner.capability import BodySpace, com_region
+from planner.pictures.body_plots import draw_polygon
+from planner.pictures.com_plots import axis_words
+from planner.pictures.plan_scene import WORLD_UP, drawn_scene, view_directions
+from planner.pictures.plan_views import UTILISATION_COLOURS, UTILISATION_NORM, View, draw_scene
+from planner.pictures.settings import PICTURE_SETTINGS
+from planner.result import Plan
+from planner.route import Climb, Knot, KnotPhase, RouteResult
+
+__all__ = ["draw_climb", "draw_support"]
+
+
+def draw_climb(climb: Climb, result: RouteResult) -> Figure:
+    """Draw the robot on the rock at each stage, and utilisations and their bounds along the time.
+
+    Parameters
+    ----------
+    climb : Climb
+        Knots of the climb; at least one.
+    result : RouteResult
+        Plans of the stages of the same route. Of many stages some are shown, the first and the last
+        among them.
+    """
+    shown = _shown(climb)
+    figure, panels, lower = _panels(len(shown), height=2.9, below=3.6)
+    FigureCanvasAgg(figure)  # which measures texts
+    seen = view_directions(result.stages[0].question.stance)
+    right = np.cross(seen.ahead, WORLD_UP)
+    up = seen.ahead if seen.steep else WORLD_UP
+    plane = np.column_stack([right, up])
+
+    def flat(points: Array) -> Array:
+        return np.asarray(points @ plane)
+
+    for axes, knot in zip(panels, shown, strict=True):
+        assert knot.stage is not None  # as only these are shown
+        answer, question = result.plans[knot.stage], result.stages[knot.stage].question
+        axes.set_title(_title(knot, result), fontsize=8)
+        axes.set_aspect("equal")
+        if isinstance(answer, Plan):
+            scene = drawn_scene(replace(answer, joints=knot.joints), question)
+            draw_scene(View(axes, flat, flat, np.cross(up, right), deep=False), scene, noted=False)
+            for artist in (*axes.lines, *axes.collections):
+                artist.set_clip_on(True)
+        way = np.array([_hand(each, knot.limb) for each in _swing_to(climb, knot)])
+        if len(way) > 1:
+            axes.plot(*flat(way).T, ".-", color="tab:orange", markersize=3, zorder=9)
+    places = [hand.pose.position for knot in climb.knots for hand in knot.hands]
+    places += [knot.body.position for knot in climb.knots]
+    extent = flat(np.array(places))
+    around = 0.3  # rock and elbows beyond the hands [m]
+    low, high = extent.min(axis=0) - around, extent.max(axis=0) + around
+    _set_frame(panels, low, high)
+    _draw_margins(lower, climb)
+    figure.colorbar(
+        ScalarMappable(UTILISATION_NORM, UTILISATION_COLOURS),
+        ax=lower,
+        label="utilisation of a hand's force, a joint [1]",
+        extend="max",
+        pad=0.01,
+    )
+    side = "above" if seen.steep and seen.into[2] < 0.0 else "below" if seen.steep else "behind"
+    figure.suptitle(
+        f"{climb.route.name}: seen from {side}, across and up in W [m]; orange: way of the hand",
+        fontsize=11,
+        parse_math=False,
+    )
+    return figure
+
+
+def draw_support(climb: Climb, result: RouteResult) -> Figure | None:
+    """Draw where the centre of mass may be at each stage, across gravity, and its way to the stage.
+
+    Parameters
+    ----------
+    climb : Climb
+        Knots of the climb; at least one.
+    result : RouteResult
+        Plans of the stages of the same route.
+
+    Returns
+    -------
+    Figure or None
+        None if the load leaves no such region: without weight, or with an angular acceleration.
+    """
+    shown = _shown(climb)
+    try:
+        spaces = [BodySpace(result.stages[k.stage or 0].question) for k in shown]
+        regions = [com_region(space) for space in spaces]
+    except InvalidInputError:
+        return None
+    figure, panels, _ = _panels(len(shown), height=2.9, below=0.0)
+    places: list[Array] = []
+    for axes, knot, region in zip(panels, shown, regions, strict=True):
+        if region.polygon is not None:
+            draw_polygon(axes, region.polygon)
+            places += [*region.polygon.outer]
+        for hand in knot.hands:
+            style = {} if hand.on_rock else {"markerfacecolor": "none"}
+            place = region.axes @ hand.pose.position
+            places.append(place)
+            axes.plot(*place, "s", color=PICTURE_SETTINGS.limb, markersize=4, **style)
+        way = np.array([_com(climb, each) for each in _since_stage(climb, knot)]) @ region.axes.T
+        axes.plot(*way.T, "-", color=PICTURE_SETTINGS.asked, linewidth=1.2)
+        axes.plot(*way[0], "o", color="white", markeredgecolor="black", markersize=5)
+        axes.plot(*way[-1], "o", color=PICTURE_SETTINGS.asked, markersize=4)
+        margin = region.margin
+        room = "no region"
+        if margin is not None:
+            room = f"{1e3 * abs(margin):.0f} mm {'inside' if margin >= 0.0 else 'outside'}"
+        axes.set_title(f"{_title(knot, result)}\n{room}", fontsize=8)
+        axes.set_aspect("equal")
+    extent, edge = np.array(places), 0.1  # around all [m]
+    _set_frame(panels, extent.min(axis=0) - edge, extent.max(axis=0) + edge)
+    across, up = (axis_words(axis) for axis in regions[0].axes)
+    figure.supxlabel(f"{across} of W [m]", fontsize=9)
+    figure.supylabel(f"{up} of W [m]", fontsize=9)
+    figure.suptitle(
+        f"{climb.route.name}: where the centre of mass may be, across gravity\n"
+        "way from the stage before (white) to the stage (black); squares: hands, empty in the air",
+        fontsize=11,
+        parse_math=False,
+    )
+    return figure
+
+
+def _draw_margins(axes: Any, climb: Climb) -> None:
+    """Draw utilisations of knots and the bounds between them, with phases and moves."""
+    times = np.array([knot.time for knot in climb.knots])
+    phases: tuple[str, ...] = get_args(KnotPhase)
+    named: set[str] = set()
+    for before, knot in pairwise(climb.knots):
+        colour = colormaps["Pastel1"](phases.index(knot.phase))
+        label = None if knot.phase in named else knot.phase
+        named.add(knot.phase)
+        axes.axvspan(before.time, knot.time, color=colour, linewidth=0.0, label=label)
+        if knot.bound is not None:
+            ends = [before.time, knot.time]
+            style = {} if knot.index != climb.knots[1].index else {"label": "bound between knots"}
+            axes.plot(ends, [knot.bound] * 2, color="tab:red", linewidth=1.5, **style)
+    used = [knot.utilisation for knot in climb.knots]
+    axes.plot(times, used, ".-", color="black", linewidth=1.0, markersize=4, label="knots")
+    cap = climb.route.limits.utilisation
+    axes.axhline(cap, color="tab:red", linestyle="--", label=f"limit {cap:g}")
+    top = 1.15 * max(cap, *used, *(knot.bound or 0.0 for knot in climb.knots))
+    begun = 0.0
+    for number, group in groupby(climb.knots, key=lambda knot: knot.move):
+        end = max(knot.time for knot in group)
+        if number:
+            axes.axvline(begun, color="0.4", linewidth=0.8)
+            middle = (begun + end) / 2.0
+            axes.text(middle, 0.97 * top, str(number), ha="center", va="top", weight="bold")
+        begun = end
+    if climb.failure is not None:
+        text = textwrap.fill(f"move {climb.failure.move} fails: {climb.failure.reason}", 60)
+        box = {"facecolor": "white", "edgecolor": "tab:red"}
+        axes.text(begun, 0.05 * top, text, ha="right", va="bottom", fontsize=8, bbox=box)
+    axes.set(xlabel="time [s]", ylabel="utilisation [1]", ylim=(0.0, top))
+    axes.set_xlim(times[0], max(times[-1], times[0] + 1e-3))
+    axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=10, frameon=False)
+
+
+def _panels(count: int, height: float, below: float) -> tuple[Figure, list[Any], Any]:
+    """Return a figure with panels in rows, and one axes as wide as all of them below.
+
+    ``height``: of a row; ``below``: of the axes below, zero for none [inch].
+    """
+    columns = min(count, 6)
+    rows = math.ceil(count / columns)
+    size = (max(2.5 * columns, 9.0), height * rows + below + 0.8)
+    figure = Figure(figsize=size, layout="constrained")
+    ratios = [height] * rows + ([below] if below else [])
+    grid = figure.add_gridspec(len(ratios), columns, height_ratios=ratios)
+    panels = [figure.add_subplot(grid[i // columns, i % columns]) for i in range(count)]
+    return figure, panels, figure.add_subplot(grid[-1, :]) if below else None
+
+
+def _set_frame(panels: Sequence[Any], low: Array, high: Array) -> None:
+    """Show the same part of W in all panels; only the outer ones have numbers."""
+    columns = panels[0].get_subplotspec().get_gridspec().ncols
+    for i, axes in enumerate(panels):
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        axes.xaxis.set_major_locator(MaxNLocator(4))
+        last = i + columns >= len(panels)
+        axes.tick_params(labelsize=7, labelleft=i % columns == 0, labelbottom=last)
+        axes.grid(alpha=0.3)
+
+
+def _shown(climb: Climb) -> list[Knot]:
+    """Return the knots of stages; of many, as many as can be seen, evenly spread."""
+    staged = [knot for knot in climb.knots if knot.stage is not None]
+    most = 24
+    chosen = np.linspace(0, len(staged) - 1, min(len(staged), most)).round().astype(int)
+    return [staged[i] for i in chosen]
+
+
+def _title(knot: Knot, result: RouteResult) -> str:
+    limb = "" if knot.limb is None else f" {knot.limb.replace('_', ' ')}"
+    move = f"{knot.move} " if knot.move else ""
+    phase = result.stages[knot.stage or 0].phase
+    return f"{move}{phase}{limb}\n{knot.time:.1f} s, utilisation {knot.utilisation:.2f}"
+
+
+def _since_stage(climb: Climb, knot: Knot) -> Sequence[Knot]:
+    """Return the knots from the stage before to a stage."""
+    staged = [each.index for each in climb.knots if each.stage is not None]
+    before = [index for index in staged if index < knot.index]
+    first = before[-1] if before else knot.index
+    return [each for each in climb.knots if first <= each.index <= knot.index]
+
+
+def _swing_to(climb: Climb, knot: Knot) -> Sequence[Knot]:
+    """Return the knots of a move up to a knot from which its hand is in the air on."""
+    own = [each for each in climb.knots if each.move == knot.move and each.index <= knot.index]
+    limb = knot.limb
+    air = [k.index for k in own for h in k.hands if h.limb == limb and not h.on_rock]
+    return [each for each in own if air and each.index >= air[0]]
+
+
+def _hand(knot: Knot, limb: str | None) -> Array:
+    return next(hand.pose.position for hand in knot.hands if hand.limb == limb)
+
+
+def _com(climb: Climb, knot: Knot) -> Array:
+    """Return the centre of mass of the load's own mass at a knot, in W [m]."""
+    given, robot = climb.route.load.com, climb.route.start.robot
+    return knot.body.apply(robot.com_at(knot.joints) if given is None else np.array(given))

@@ -1,0 +1,184 @@
+"""Write the knots of a climb as JSON lines and as Parquet, and read the lines again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import msgspec
+
+from hand_models.base import InvalidInputError, whole_file
+from hand_models.hand import FINGERS
+from planner import LimitName
+from service.bulk.columns import Column, value_at
+from service.bulk.exports import exporter_at
+from service.replies import WRENCH_AXES, ClimbFailureReply, KnotReply
+
+__all__ = [
+    "ClimbSummary",
+    "knot_columns",
+    "read_climb_summary",
+    "read_trajectory",
+    "write_trajectory",
+]
+
+
+def write_trajectory(knots: Sequence[KnotReply], folder: Path) -> dict[str, Path]:
+    """Write ``trajectory.jsonl``, a knot a line, and the same as a table, ``trajectory.parquet``.
+
+    Parameters
+    ----------
+    knots : sequence of KnotReply
+        Knots in climbing order.
+    folder : Path
+        Existing folder; files of these names are replaced, or removed where there are no knots.
+
+    Returns
+    -------
+    dict of str to Path
+        Files by the names ``trajectory`` and ``trajectory table``; without the latter if pyarrow
+        is not installed, without both if there are no knots.
+    """
+    lines = _lines_of(folder)
+    table = lines.with_suffix(".parquet")
+    lines.unlink(missing_ok=True)
+    table.unlink(missing_ok=True)
+    if not knots:
+        return {}
+    with whole_file(lines) as part:
+        part.write_bytes(msgspec.json.Encoder().encode_lines(knots))
+    try:
+        export = exporter_at(table)
+    except InvalidInputError:
+        # pyarrow is missing
+        return {"trajectory": lines}
+    assert export is not None  # of this ending
+    columns = knot_columns(knots[0])
+    paths = [column.path or (column.name,) for column in columns]
+    plain = map(msgspec.to_builtins, knots)
+    export(table, columns, ([value_at(knot, path) for path in paths] for knot in plain))
+    return {"trajectory": lines, "trajectory table": table}
+
+
+def read_trajectory(folder: Path) -> list[KnotReply]:
+    """Read the knots that `write_trajectory` has written into a folder.
+
+    Raises
+    ------
+    InvalidInputError
+        If the folder has no trajectory, or a line of it is no knot, or the times decrease.
+    """
+    path = _lines_of(folder)
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise InvalidInputError(
+            f"{path}: {error.strerror}; write it with: crux route ROUTE -o {folder}", field="DIR"
+        ) from None
+    knots: list[KnotReply] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        try:
+            knots.append(msgspec.json.decode(line, type=KnotReply))
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            raise InvalidInputError(f"{path}, line {number}: {error}", field="DIR") from None
+        if len(knots) > 1 and not knots[-1].time >= knots[-2].time:
+            raise InvalidInputError(
+                f"{path}, line {number}: time must not decrease, got {knots[-1].time:g} s after "
+                f"{knots[-2].time:g} s",
+                field="DIR",
+            )
+    if not knots:
+        raise InvalidInputError(f"{path}: has no knots", field="DIR")
+    return knots
+
+
+class ClimbOutcome(msgspec.Struct):
+    """What a summary says of a climb's end: ``failure`` is None if it runs from end to end."""
+
+    failure: ClimbFailureReply | None
+
+
+class ClimbSummary(msgspec.Struct):
+    """The parts of ``summary.json`` that are needed to play a climb."""
+
+    route: str
+    robot: str
+    climb: ClimbOutcome
+
+
+def read_climb_summary(folder: Path) -> ClimbSummary:
+    """Read the parts of the ``summary.json`` beside a trajectory that are needed to play it.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is no such file, or it is of a route without a trajectory.
+    """
+    path = folder / "summary.json"
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=ClimbSummary)
+    except OSError as error:
+        message = str(error.strerror)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        message = str(error)
+    raise InvalidInputError(
+        f"{path}: {message}; write it with: crux route ROUTE -o {folder}", field="DIR"
+    )
+
+
+def _lines_of(folder: Path) -> Path:
+    return folder / "trajectory.jsonl"
+
+
+def knot_columns(knot: KnotReply) -> tuple[Column, ...]:
+    """Return the columns of a table of knots, for the limbs and joints that a knot has."""
+    return tuple(_columns(knot))
+
+
+def _columns(knot: KnotReply) -> Iterator[Column]:
+    yield Column("index", "int", "1", "of the knot, from zero")
+    yield Column("move", "int", "1", "its move, from one; zero is the start")
+    yield Column("phase", "text", "", "part of the move that the knot ends, or is in")
+    yield Column("limb", "text", "", "that moves")
+    yield Column("stage", "int", "1", "stage of the route that the knot is the plan of")
+    yield Column("time_s", "float", "s", "since the start", ("time",))
+    yield Column("utilisation", "float", "1", "the largest of any limit")
+    yield Column("bound", "float", "1", "largest utilisation on the way from the knot before")
+    for part in LimitName.__struct_fields__:
+        meaning = f"{part} of the limit that is used most"
+        yield Column(f"limiting_{part}", "text", "", meaning, ("limiting", part))
+    yield Column("verified", "bool", "", "whether the knot has passed its independent check")
+    yield from _pose("body", "B", ("body",))
+    for limb, angles in knot.joints.items():
+        for i in range(len(angles)):
+            name, which = f"{limb}_joint_{i + 1}", f"joint {i + 1} of the limb, from the body"
+            yield Column(f"{name}_rad", "float", "rad", f"angle of {which}", ("joints", limb, i))
+            torque = ("joint_torque", limb, i)
+            yield Column(f"{name}_torque_Nm", "float", "N·m", f"torque of {which}", torque)
+    for at, hand in enumerate(knot.hands):
+        here, limb = ("hands", at), hand.limb
+        yield Column(f"{limb}_on_rock", "bool", "", "whether the hand touches", (*here, "on_rock"))
+        yield from _pose(f"{limb}_hand", "H", (*here, "pose"))
+        for i, finger in enumerate(FINGERS):
+            name, whose = f"{limb}_{finger}", "of its tendon"
+            at_tension, at_winch = (*here, "tensions", i), (*here, "winch_angles", i)
+            yield Column(f"{name}_tension_N", "float", "N", f"tension {whose}", at_tension)
+            yield Column(f"{name}_winch_rad", "float", "rad", f"winch angle {whose}", at_winch)
+        wrenches = {
+            "wrench": ("", "of the hand on the rock, in H"),
+            "wrench_in_world": ("world_", "of the rock on the hand, in W about its origin"),
+        }
+        for part, (word, meaning) in wrenches.items():
+            for i, axis in enumerate(WRENCH_AXES):
+                unit = "N" if axis.startswith("f") else "N·m"
+                name = f"{limb}_{word}{axis}_{unit.replace('·', '')}"
+                yield Column(name, "float", unit, f"{axis} {meaning}", (*here, part, i))
+
+
+def _pose(name: str, frame: str, path: tuple[str | int, ...]) -> Iterator[Column]:
+    for i, axis in enumerate("xyz"):
+        meaning = f"{axis} of the origin of {frame}, in W"
+        yield Column(f"{name}_{axis}_m", "float", "m", meaning, (*path, "position", i))
+    for i, part in enumerate(("qx", "qy", "qz", "qw")):
+        meaning = f"{part[1]} of the quaternion of {frame} in W"
+        yield Column(f"{name}_{part}", "float", "1", meaning, (*path, "orientation", i))

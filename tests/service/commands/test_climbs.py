@@ -1,0 +1,146 @@
+"""What comes out of a route: a trajectory, stances of its stages, pictures, and what fails."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from service.bulk import read_climb_summary, read_trajectory
+from service.commands.cli import run_command_line
+from service.replies import ClimbFailureReply, KnotReply
+from service.requests import RouteRequest
+from tests.suite.helpers.climbs import blocked, climbed, failed, two_moves
+from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED, complaint, result
+
+EXACT = {"rtol": 0.0, "atol": 1e-9}
+
+
+def file_of(route: RouteRequest, folder: Path) -> str:
+    path = folder / "route.json"
+    path.write_bytes(msgspec.json.encode(route))
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("climb")
+    assert run_command_line(["route", file_of(two_moves(), folder), "-o", str(folder)]) == DONE
+    return folder
+
+
+def test_a_folder_has_all_of_a_climb(written):
+    names = {path.name for path in written.iterdir()} - {"route.json", ".route.lock"}
+    pictures = {"margin.png", "climb.png", "support.png"}
+    assert names - {"trajectory.parquet"} == pictures | {
+        "stages.csv",
+        "summary.json",
+        "trajectory.jsonl",
+        "stages",
+    }
+    assert sorted(path.name for path in (written / "stages").iterdir()) == [
+        "00-start.json",
+        "01-lift-front_left.json",
+        "02-place-front_left.json",
+        "03-shift-front_left.json",
+        "04-lift-front_left.json",
+        "05-place-front_left.json",
+    ]
+    assert read_trajectory(written) == [KnotReply.of(knot) for knot in climbed().climb.knots]
+    about = read_climb_summary(written)
+    assert (about.route, about.robot, about.climb.failure) == ("two moves", "robosimian", None)
+
+
+def test_the_summary_has_the_largest_utilisation_and_bound_of_every_move(written):
+    moves = json.loads((written / "summary.json").read_text())["climb"]["moves"]
+    knots = read_trajectory(written)
+    assert [move["move"] for move in moves] == [0, 1, 2]
+    assert np.isclose(sum(move["time"] for move in moves), knots[-1].time, **EXACT)
+    for move in moves:
+        own = [knot for knot in knots if knot.move == move["move"]]
+        most = max(own, key=lambda knot: knot.utilisation)
+        assert move["utilisation"] == most.utilisation
+        assert move["limiting"] == msgspec.structs.asdict(most.limiting)
+        assert move["bound"] == max((k.bound for k in own if k.bound is not None), default=None)
+        assert move["knots"] == len(own)
+        assert move["complete"]
+
+
+@pytest.mark.parametrize("index", [1, 3])
+def test_crux_plan_answers_a_stage_as_the_route_does(index, written, capfd):
+    (file,) = (written / "stages").glob(f"{index:02d}-*.json")
+    assert run_command_line(["plan", str(file), "--json", "-q"]) == DONE
+    reply = result(capfd)
+    (knot,) = (knot for knot in read_trajectory(written) if knot.stage == index)
+    assert np.isclose(reply["utilisation"], knot.utilisation, **EXACT)
+    planned = {hand["limb"]: hand for hand in reply["hands"]}
+    for hand in knot.hands:
+        if hand.on_rock:
+            told = [finger["tendon_tension"] for finger in planned[hand.limb]["fingers"]]
+            assert np.allclose(told, hand.tensions, **EXACT)
+            assert np.allclose(planned[hand.limb]["wrench"], hand.wrench, **EXACT)
+
+
+def test_one_stage_is_shown_as_crux_plan_shows_it_and_written(written, tmp_path, capfd):
+    route, file = str(written / "route.json"), tmp_path / "one.json"
+    assert run_command_line(["route", route, "--stage", "1", "-o", str(file)]) == DONE
+    shown = capfd.readouterr().out
+    assert "OPTIMAL   utilisation 0.79" in shown
+    (whole,) = (written / "stages").glob("01-*.json")
+    assert json.loads(file.read_bytes()) == json.loads(whole.read_bytes())
+    assert run_command_line(["route", route, "--stage", "6"]) == BAD_INPUT
+    assert "--stage: must be below 6, the number of stages, got 6" in complaint(capfd)
+    assert run_command_line(["route", route, "--stage", "1", "-o", str(tmp_path)]) == BAD_INPUT
+    assert "must end in .json with --stage" in complaint(capfd)
+    assert run_command_line(["route", route, route, "--stage", "1"]) == BAD_INPUT
+    assert "is for one route" in complaint(capfd)
+    assert run_command_line(["route", route]) == BAD_INPUT
+    assert "give -o DIR, or --stage K" in complaint(capfd)
+
+
+def test_a_climb_that_fails_says_where_and_why(tmp_path, capfd):
+    out = tmp_path / "out"
+    route = file_of(blocked(), tmp_path)
+    assert run_command_line(["route", route, "-o", str(out)]) == OVERLOADED
+    printed = capfd.readouterr().out
+    assert max(map(len, printed.replace(str(tmp_path), "").splitlines())) <= 80
+    words = " ".join(printed.split())
+    failure = failed().climb.failure
+    assert f"move 2 fails (swing): {failure.reason}" in words
+    assert read_climb_summary(out).climb.failure == ClimbFailureReply.of(failure)
+    # as far as it comes, and every stage is there as a stance
+    assert read_trajectory(out)[-1].phase == "open"
+    assert len([*(out / "stages").iterdir()]) == len(failed().result.stages)
+    moves = json.loads((out / "summary.json").read_text())["climb"]["moves"]
+    assert [move["complete"] for move in moves] == [True, True, False]
+
+
+@pytest.mark.slow
+def test_a_route_whose_moves_cannot_be_planned_is_evaluated_all_the_same(tmp_path, capfd):
+    route = two_moves()
+    hands = [msgspec.structs.replace(hand, wrist="compliant") for hand in route.stance.hands]
+    stance = msgspec.structs.replace(route.stance, hands=hands, joints=None)
+    moves = [msgspec.structs.replace(route.moves[0], wrist="compliant")]
+    path = file_of(msgspec.structs.replace(route, stance=stance, moves=moves), tmp_path)
+    out = tmp_path / "out"
+    assert run_command_line(["route", path, "-o", str(out)]) in (DONE, OVERLOADED)
+    said = capfd.readouterr()
+    assert "no trajectory: stance.hands[0].wrist" in said.err
+    assert not (out / "trajectory.jsonl").exists()
+    assert len([*(out / "stages").iterdir()]) == 3
+    assert "climb" not in json.loads((out / "summary.json").read_text())
+
+
+@pytest.mark.slow
+def test_old_stages_and_trajectories_do_not_stay(written, tmp_path, capfd):
+    stages = tmp_path / "stages"
+    stages.mkdir()
+    (stages / "99-lift-front_left.json").write_text("{}")
+    (stages / "own.json").write_text("{}")
+    route = msgspec.structs.replace(two_moves(), moves=[])
+    assert run_command_line(["route", file_of(route, tmp_path), "-o", str(tmp_path)]) == DONE
+    assert sorted(path.name for path in stages.iterdir()) == ["00-start.json", "own.json"]
+    assert len(read_trajectory(tmp_path)) == 1
