@@ -99,7 +99,7 @@ def swing(
     body : Pose
         Pose of B in W.
     joints : mapping of str to ndarray, shape (n,)
-        Joint angles of every limb at the start [rad].
+        Joint angles of every limb at the start [rad]; a limb left out is not measured.
     limb : str
         The limb that swings.
     goals : sequence of ndarray, shape (n,)
@@ -125,7 +125,7 @@ def swing(
     robot, start = scene.robot, np.asarray(joints[limb], dtype=float)
     stand_off = scene_number("motion", "stand_off") if stand_off is None else stand_off
     margin = scene_number("motion", "margin") if margin is None else margin
-    others = [each for each in robot.limbs if each != limb]
+    others = [each for each in joints if each != limb]
     free = JointSpace(scene, [body], joints, (limb,), touching=others)
 
     def leaving(angles: Array, which: str) -> Array:
@@ -206,7 +206,8 @@ def clear_branches(
     body : Pose
         Pose of B in W.
     joints : mapping of str to ndarray, shape (n,)
-        Joint angles of every other limb, and those that the first ones are to be nearest to [rad].
+        Joint angles of the other limbs, of which one left out is not measured; and if known those of
+        this one that the first ones are to be nearest to [rad].
     limb : str
     pose : Pose
         Pose of H in W, closed on its hold.
@@ -218,7 +219,7 @@ def clear_branches(
     Returns
     -------
     tuple of ndarray, shape (n,)
-        Joint angles, the nearest first [rad]; none if no clear ones were found.
+        Joint angles in the order of `branches` [rad]; none if no clear ones were found.
 
     Raises
     ------
@@ -250,7 +251,7 @@ def check_shift(
         Poses of B in W, from the first one on; between two of them position and joint angles change
         linearly, and the orientation along the shortest turn.
     joints : mapping of str to ndarray, shape (m, n)
-        Angles of the limbs that hold rock [rad]; those of a limb left out are its rest angles.
+        Angles of the limbs' joints [rad]; a limb left out is not measured.
     margin : float, optional
         As of `swing`.
 
