@@ -43,8 +43,8 @@ class Clear(NamedTuple):
 def check_way(space: JointSpace, postures: Array, margin: float) -> Clear:
     """Prove that straight lines between postures are clear, or find where they are not.
 
-    Intervals are halved until no distance can fall below half of the margin between two postures:
-    the distances at both, and bounds of how much they change, tell that.
+    Intervals are halved until no distance can fall below half of the least one, or of the margin,
+    between two postures: the distances at both, and bounds of how much they change, tell that.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def check_way(space: JointSpace, postures: Array, margin: float) -> Clear:
     postures : ndarray, shape (m, d)
         Joint angles of the postures [rad].
     margin : float
-        Least distance at every posture that is looked at [m].
+        Least distance at every posture that is looked at, above 0 [m].
 
     Raises
     ------
@@ -67,7 +67,7 @@ def check_way(space: JointSpace, postures: Array, margin: float) -> Clear:
         deadline.check("a limb's way was proven to be clear")
         motion = space.motions(second - first)
         proven = np.minimum(np.minimum(low, high), 0.5 * (low + high - motion)).min(axis=1)
-        open_ = proven < 0.5 * margin
+        open_ = proven < 0.5 * least
         bound = min(bound, float(proven[~open_].min(initial=np.inf)))
         if not open_.any():
             return Clear(space.nearest(worst), bound)
