@@ -163,7 +163,7 @@ class JointSpace:
         self._measured = np.concatenate(
             [*([np.arange(len(scene.body))] if last else []), *(scene.own[limb] for limb in limbs)]
         )
-        known = np.isfinite(self._still).all(axis=(1, 2))[scene.pairs].all(axis=1)
+        known = np.asarray(np.isfinite(self._still[:, 0, 0]))[scene.pairs].all(axis=1)
         moves = np.isin(scene.pairs, np.concatenate([scene.own[limb] for limb in limbs]))
         self._pairs = np.ascontiguousarray(scene.pairs[known & moves.any(axis=1)])
         self._spread_points()

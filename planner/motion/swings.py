@@ -210,8 +210,8 @@ def clear_branches(
     body : Pose
         Pose of B in W.
     joints : mapping of str to ndarray, shape (n,)
-        Joint angles of the other limbs, of which one left out is not measured; and if known those of
-        this one that the first ones are to be nearest to [rad].
+        Joint angles of the other limbs, of which one left out is not measured, and if known those
+        of this one that the first ones are to be nearest to [rad].
     limb : str
     pose : Pose
         Pose of H in W, closed on its hold.
