@@ -14,7 +14,7 @@ import numpy as np
 
 from hand_models.base import Array, InvalidInputError, Pose
 from planner.motion.branch import BranchEndError, branches, follow_poses
-from planner.motion.collisions import CollisionScene, JointSpace, Nearest
+from planner.motion.collisions import CollisionScene, JointSpace, NearestPair
 from planner.motion.ways import Clear, check_way, search_way
 from planner.robots import Robot, scene_number
 
@@ -29,7 +29,7 @@ class NoWayError(InvalidInputError):
     limb : str
     where : str
         Part of the swing, as a clause.
-    nearest : Nearest
+    nearest : NearestPair
         What meets there.
     margin : float
         Distance that is needed [m].
@@ -42,7 +42,7 @@ class NoWayError(InvalidInputError):
 
     kind = "unreachable"
 
-    def __init__(self, limb: str, where: str, nearest: Nearest, margin: float) -> None:
+    def __init__(self, limb: str, where: str, nearest: NearestPair, margin: float) -> None:
         super().__init__(
             f"{limb} has no way to its new hold: {where}, {nearest}, and {1e3 * margin:.3g} mm "
             "are needed; shift the body, or choose another hold"
@@ -62,7 +62,7 @@ class Swing:
     retreat, approach : int
         Index of the corner at which the hand has gone back from its old hold, and from which it
         goes straight on to the new one.
-    nearest : Nearest
+    nearest : NearestPair
         The least distance that was met between those two corners.
     bound : float
         Proven lower bound of all distances between them [m].
@@ -74,7 +74,7 @@ class Swing:
     path: Array
     retreat: int
     approach: int
-    nearest: Nearest
+    nearest: NearestPair
     bound: float
     how: Literal["straight", "searched"]
 
@@ -142,7 +142,7 @@ def swing(
     back = leaving(start, "old")
     onto: list[Array] = []
     refused: list[BranchEndError | NoWayError] = []
-    blocked: list[Nearest] = []
+    blocked: list[NearestPair] = []
     for goal in goals:
         try:
             onto.append(leaving(np.asarray(goal, dtype=float), "new")[::-1])
