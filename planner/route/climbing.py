@@ -28,7 +28,7 @@ from planner.motion import (
 from planner.prepare import posture
 from planner.programs import CAP_SLACK
 from planner.question import HandOnHold
-from planner.robots import UnreachableError, solve_limbs
+from planner.robots import UnreachableError, scene_number, solve_limbs
 from planner.route.between import Passage
 from planner.route.branch_choice import bodies_until_lifted, candidates_on, lasting, start_joints
 from planner.route.climb import Move, Route
@@ -171,7 +171,8 @@ class _Planner:
                 off = max(off, float(np.linalg.norm(away, axis=1).max()))
             if off <= numbers.slack:
                 break
-        seen = check_shift(self._scene, [first.body, *bodies], ways)
+        margin = scene_number("motion", "margin_at_hold")
+        seen = check_shift(self._scene, [first.body, *bodies], ways, margin=margin)
         if not seen.clear:
             raise NoPlanError(f"while the body shifts, {seen.nearest}")
         for k, body in enumerate(bodies, start=1):
