@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from hand_models.base import Array, Pose, skew, turns_about, wrench_transport
 from hand_models.wrench_spaces import WRENCH_SCALE
 from planner.route.com_travel import mass_travel, turn_between
-from planner.route.held import Held, Posed, hold_with
+from planner.route.held import HeldPosture, Posed, hold_with
 from planner.route.hold_rows import HoldRows
 
 __all__ = ["Passage"]
@@ -42,14 +42,14 @@ class Passage:
 
     Attributes
     ----------
-    start, end : Held
+    start, end : HeldPosture
     excess : float
         Utilisation that passive reactions may cost above the larger of both ends: how they settle
         is chosen for that.
     """
 
-    start: Held
-    end: Held
+    start: HeldPosture
+    end: HeldPosture
     excess: float = 0.02
 
     @cached_property
@@ -89,7 +89,7 @@ class Passage:
             return start.beside(moving)
         return Posed(start.route, start.hands, body, angles, moving)
 
-    def hold(self, t: float) -> Held:
+    def hold(self, t: float) -> HeldPosture:
         """Return the verified loads of what is interpolated at a time t from 0 to 1.
 
         Raises

@@ -56,7 +56,7 @@ def lasting(
 ) -> Iterator[Array]:
     """Yield those of a limb's joint angles that are clear, and stay so while the body moves.
 
-    Last come those that keep but the margin of hands at their holds.
+    Last come those that keep but the margin of hands at their holds, until they leave them.
 
     Parameters
     ----------
@@ -74,6 +74,7 @@ def lasting(
         Whether the hand leaves its hold at the last of the bodies.
     """
     robot, margin = scene.robot, scene_number("motion", "margin")
+    at_hold = scene_number("motion", "margin_at_hold")
     inside = [body.inverse() @ hand for body in bodies]
     others, ways = [each for each in robot.limbs if each != limb], [robot.limbs] * len(bodies)
     if lifts:
@@ -93,10 +94,10 @@ def lasting(
         except BranchEndError:
             continue
         pairs = zip(spaces, [angles, *after], strict=True)
-        least = min(float(space.clearances(at[None]).min()) for space, at in pairs)
-        if least >= margin:
+        least = [float(space.clearances(at[None]).min()) for space, at in pairs]
+        if min(least) >= margin:
             yield angles
-        elif least >= scene_number("motion", "margin_at_hold"):
+        elif min(least) >= at_hold and (not lifts or least[-1] >= margin):
             near.append(angles)
     yield from near
 

@@ -32,10 +32,17 @@ from planner.robots import UnreachableError, scene_number, solve_limbs
 from planner.route.between import Passage
 from planner.route.branch_choice import bodies_until_lifted, candidates_on, lasting, start_joints
 from planner.route.climb import Move, Route
-from planner.route.first_checks import checked_stages, refuse, scene_of
-from planner.route.held import Held, MovingHand, NoPlanError, Posed, hold_as_planned, hold_with
+from planner.route.first_checks import checked_stages, climb_scene, refuse
+from planner.route.held import (
+    HeldPosture,
+    MovingHand,
+    NoPlanError,
+    Posed,
+    hold_as_planned,
+    hold_with,
+)
 from planner.route.knots import Climb, Failure, Knot, KnotPhase
-from planner.route.moving import at_closing, closing_states, in_air, opening_states
+from planner.route.moving import closing_loads, closing_states, in_air, opening_states
 from planner.route.settings import ClimbSettings, KnotNumbers
 from planner.solving import Solution
 
@@ -108,13 +115,13 @@ class _Planner:
     knots : list of Knot
     """
 
-    _at: Held
+    _at: HeldPosture
 
     def __init__(self, route: Route, settings: ClimbSettings) -> None:
         self.knots: list[Knot] = []
         self._route, self._settings, self._numbers = route, settings, KnotNumbers.bundled()
         self._stages = checked_stages(route)
-        self._scene = scene_of(route)
+        self._scene = climb_scene(route)
         self._stage = self._move = 0
         self._limb: str | None = None
         self._phase: KnotPhase = "start"
@@ -195,7 +202,7 @@ class _Planner:
         others = tuple(hand for hand in held.posed.hands if hand.limb != limb)
         self._near = None
         alone = self._plan(replace(held.posed, hands=others, moving=states[0]))
-        loads = [*alone.loads[:h], at_closing(settled, space), *alone.loads[h:]]
+        loads = [*alone.loads[:h], closing_loads(settled, space), *alone.loads[h:]]
         self._go(hold_with(held.posed, loads))
         self._at = alone
         return states
@@ -259,7 +266,7 @@ class _Planner:
         h = whole.prepared.limbs.index(limb)
         settled, space = whole.prepared.batch.hands[h], whole.prepared.hands.spaces[h]
         alone = self._at.loads
-        self._at = hold_with(whole, [*alone[:h], at_closing(settled, space), *alone[h:]])
+        self._at = hold_with(whole, [*alone[:h], closing_loads(settled, space), *alone[h:]])
         self._near = None
         self._go(self._plan(whole, stage=True), stage=True)
 
@@ -275,7 +282,7 @@ class _Planner:
             failure = Failure(self._move, phase, self._limb, str(error))
             raise _BlockedError(failure) from error
 
-    def _plan(self, posed: Posed, *, stage: bool = False) -> Held:
+    def _plan(self, posed: Posed, *, stage: bool = False) -> HeldPosture:
         """Return the plan of a posture; between stages palms press, so that they can settle."""
         press = self._numbers.press
         for least in (0.0,) if stage else (press, 0.25 * press, 0.0):
@@ -296,7 +303,7 @@ class _Planner:
         angles = {**posed.angles, **{limb: each[-1] for limb, each in found.items()}}
         return replace(posed, body=body, angles=angles)
 
-    def _go(self, end: Held, *, stage: bool = False, halvings: int | None = None) -> None:
+    def _go(self, end: HeldPosture, *, stage: bool = False, halvings: int | None = None) -> None:
         """Append knots on the way to where the robot is held next."""
         left = self._numbers.halvings if halvings is None else halvings
         start, numbers = self._at, self._numbers
@@ -328,7 +335,7 @@ class _Planner:
         self._append(end, bound, stage=stage)
         self._at = end
 
-    def _append(self, held: Held, bound: float | None, *, stage: bool = False) -> None:
+    def _append(self, held: HeldPosture, bound: float | None, *, stage: bool = False) -> None:
         """Append a knot."""
         used, limiting = held.most_used
         knot = Knot(

@@ -1,4 +1,4 @@
-"""What a climb needs before its first knot: a route that is valid, and all rock about the robot."""
+"""Check a route before its climb is planned, and place all rock about the robot."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from planner.prepare import settle_each
 from planner.route.climb import Route, RouteStage, in_route, stages
 from planner.route.evaluation import must_touch
 
-__all__ = ["checked_stages", "refuse", "scene_of"]
+__all__ = ["checked_stages", "climb_scene", "refuse"]
 
 
 def refuse(route: Route) -> None:
@@ -73,7 +73,7 @@ def checked_stages(route: Route) -> tuple[RouteStage, ...]:
     return found
 
 
-def scene_of(route: Route) -> CollisionScene:
+def climb_scene(route: Route) -> CollisionScene:
     """Return the robot with all rock of a climb."""
     robot = route.start.robot
     hands = [*route.start.hands, *(move.hand for move in route.moves)]

@@ -25,7 +25,7 @@ from planner.route.knots import HandKnot
 from planner.solving import Checks, Solution, Verified, answer_on, idle_joints
 from planner.verification import Check
 
-__all__ = ["Held", "MovingHand", "NoPlanError", "Posed", "hold_as_planned", "hold_with"]
+__all__ = ["HeldPosture", "MovingHand", "NoPlanError", "Posed", "hold_as_planned", "hold_with"]
 
 
 class NoPlanError(Exception):
@@ -164,7 +164,7 @@ class Posed:
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class HeldPosture:
     """Verified loads of a posture.
 
     Attributes
@@ -269,7 +269,7 @@ class Held:
         return tuple(found)
 
 
-def hold_as_planned(posed: Posed, near: Solution | None = None, press: float = 0.0) -> Held:
+def hold_as_planned(posed: Posed, near: Solution | None = None, press: float = 0.0) -> HeldPosture:
     """Return the verified plan of a posture.
 
     Parameters
@@ -297,7 +297,9 @@ def hold_as_planned(posed: Posed, near: Solution | None = None, press: float = 0
         or answer.utilisation > prepared.question.limits.utilisation + CAP_SLACK
     ):
         raise NoPlanError(found.reason or "no plan passes the checks")
-    held = Held(posed, prepared, answer.solution.loads, answer.arrays, answer.used, answer.solution)
+    held = HeldPosture(
+        posed, prepared, answer.solution.loads, answer.arrays, answer.used, answer.solution
+    )
     return _checked(held)
 
 
@@ -314,7 +316,7 @@ def _pressing(prepared: PreparedStance, press: float) -> PreparedStance:
     return replace(prepared, hands=hands.with_sets(spaces, scaled=tuple(scaled)))
 
 
-def hold_with(posed: Posed, loads: Sequence[Array]) -> Held:
+def hold_with(posed: Posed, loads: Sequence[Array]) -> HeldPosture:
     """Return the verified loads of a posture that are given, shape (m,) for each hand [N].
 
     Raises
@@ -324,7 +326,7 @@ def hold_with(posed: Posed, loads: Sequence[Array]) -> Held:
     """
     prepared = posed.prepared
     arrays, used, _ = posed.recovery.read(loads)
-    held = Held(posed, prepared, tuple(loads), arrays, used)
+    held = HeldPosture(posed, prepared, tuple(loads), arrays, used)
     # the check knows of no wrench of a hand beside those of the stance
     air = replace(posed, moving=None)
     check = Check(prepared.question, prepared.batch, prepared.where)
@@ -335,7 +337,7 @@ def hold_with(posed: Posed, loads: Sequence[Array]) -> Held:
     return _checked(held)
 
 
-def _checked(held: Held) -> Held:
+def _checked(held: HeldPosture) -> HeldPosture:
     """Return loads whose moving limb passes its own check, and which are within the limits."""
     moving, most = held.posed.moving, held.prepared.question.limits.utilisation
     if moving is not None and moving.on_rock:
@@ -349,7 +351,7 @@ def _checked(held: Held) -> Held:
     return held
 
 
-def _check_moving(held: Held, moving: MovingHand) -> None:
+def _check_moving(held: HeldPosture, moving: MovingHand) -> None:
     """Recompute balance and torques with the moving hand's wrench, link by link from the URDF."""
     posed, load = held.posed, held.posed.route.load
     gravity = posed.body.rotation.T @ posed.route.start.gravity

@@ -13,10 +13,10 @@ from hand_models.opening import HandPath, closing_path, opening_path
 from hand_models.wrench_spaces import WrenchSpace
 from planner.route.held import MovingHand, NoPlanError
 
-__all__ = ["at_closing", "closing_states", "in_air", "opening_states"]
+__all__ = ["closing_loads", "closing_states", "in_air", "opening_states"]
 
 
-def at_closing(settled: SettledHand, space: WrenchSpace) -> Array:
+def closing_loads(settled: SettledHand, space: WrenchSpace) -> Array:
     """Return the loads y, shape (m,), of a hand at its closing tensions and no other load [N]."""
     tensions = [name.endswith("/tension") for name in space.columns]
     return np.where(tensions, settled.closing_tension, 0.0)
@@ -61,7 +61,7 @@ def in_air(hand: MovingHand) -> MovingHand:
 def _states(
     limb: str, settled: SettledHand, space: WrenchSpace, path: HandPath, *, opens: bool
 ) -> list[MovingHand]:
-    y = at_closing(settled, space)
+    y = closing_loads(settled, space)
     closed, used = space.wrench(y), (space.L @ y + space.l0) / space.s
     winches = _winch_angles(settled, path, opens=opens)
     # the set's wrench of the closed hand, and the path's, differ by little

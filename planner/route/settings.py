@@ -1,4 +1,4 @@
-"""How a controller goes from knot to knot of a climb, and how many knots there are."""
+"""Settings of a climb: rates of its controller, and when knots are put in between."""
 
 from __future__ import annotations
 
