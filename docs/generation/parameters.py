@@ -25,6 +25,7 @@ FILES = {
         "robosimian.toml",
         "scene.toml",
         "plans.toml",
+        "climb.toml",
         "slips.toml",
         "diagnosis.toml",
     ),

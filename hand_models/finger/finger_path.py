@@ -33,7 +33,7 @@ from hand_models.finger.path_state import (
     open_states,
 )
 from hand_models.finger.phalanx_shape import PhalanxShape, fan_out
-from hand_models.finger.settings import CONTACT_CODES
+from hand_models.finger.settings import CONTACT_CODES, SETTINGS
 from hand_models.finger.settled_finger import SettledFinger
 from hand_models.sections import Complexes, Flags, Outlines
 
@@ -116,7 +116,8 @@ def opening_paths(
         normals = finger.normals(shears, closing.base_tile) @ [1.0, closing.tension]
         gap, bears = around["gap"][i], np.isin(range(JOINT_COUNT), finger.bearing)
         share, caught = finger.engagement, np.array(finger.touching)
-        near = bears & (gap <= 2.0 * shape.fine)
+        # one that is laid in closed form is off its bed of springs by some micrometres
+        near = bears & (gap <= SETTINGS.lost_gap * shape.length)
         held = caught & ~near & (normals < 0.0)
         start["mode"][i] = np.select(
             [near, held], [CONTACT_CODES.on, CONTACT_CODES.held], CONTACT_CODES.off

@@ -11,7 +11,7 @@ after it, whose tensions differ by a rounding.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -99,8 +99,8 @@ class HandPath:
     jammed : tuple of Jam
         Fingers that do not let go.
     resting : tuple of str
-        Fingers without spines on the rock that their springs press on it at the end: rock is in
-        the way of the straight finger.
+        Fingers that their springs press on the rock at the end of opening, as rock is in the way
+        of the straight finger; their spines let go as the hand retreats.
     friction : float
         μ of the surface, on which it depends whether spines let go.
     """
@@ -181,6 +181,7 @@ def _path(hand: SettledHand, force: float, *, opens: bool) -> HandPath:
     tolerance = np.repeat([force, force * PATH_SETTINGS.moment / PATH_SETTINGS.force], 3)
     knots = few_knots(at, wrenches, tolerance)
     tensions = (closing - at if opens else at).clip(0.0, closing)
+    jammed = tuple(_jams(hand, paths)) if opens and paths else ()
     return HandPath(
         tensions=np.repeat(tensions[knots, None], len(FINGERS), axis=1),
         wrenches=wrenches[knots],
@@ -189,8 +190,8 @@ def _path(hand: SettledHand, force: float, *, opens: bool) -> HandPath:
         bearing=bearing[knots],
         events=_events(hand, parts, opens=opens),
         deviation=deviations(at, wrenches, knots),
-        jammed=tuple(_jams(hand, paths)) if opens else (),
-        resting=_resting(paths) if opens else (),
+        jammed=jammed,
+        resting=_resting(paths, jammed) if opens and paths else (),
         friction=hand.surface.friction,
     )
 
@@ -214,30 +215,32 @@ def _events(hand: SettledHand, parts: list[Part], *, opens: bool) -> tuple[TileE
     )
 
 
-def _jams(hand: SettledHand, paths: list[FingerPath]) -> Iterator[Jam]:
+def _jams(hand: SettledHand, paths: Sequence[FingerPath]) -> Iterator[Jam]:
     """Yield fingers that do not let go."""
     mu = hand.surface.friction
     for name, path in zip(FINGERS, paths, strict=True):
         if not path.rests:
-            yield Jam(name, None, f"no balance of {name} was found below {path.tensions[-1]:.3g} N")
+            f = path.tensions[-1]
+            yield Jam(name, None, f"no balance of {name} was found below {f:.3g} N of tension")
             continue
         pull, shear = -path.normals[-1], path.shears[-1]
-        holds = (path.engagement[-1] > 0.0) & (pull > 0.0)
+        holds = (path.engagement[-1] > 0.0) & (pull > PATH_SETTINGS.pull)
         if holds.any():
             needed = float((shear[holds] / pull[holds]).min())
             names = " and ".join(PHALANGES[j] for j in holds.nonzero()[0].tolist())
             yield Jam(
                 name,
                 needed,
-                f"spines of {name} ({names}) hold at zero tension: they would let go with a "
-                f"friction above {needed:.3g}; the surface has {mu:.3g}",
+                f"the spines of {name} ({names}) hold at zero tension; they would let go if the "
+                f"surface's friction were above {needed:.3g}, it is {mu:.3g}",
             )
 
 
-def _resting(paths: list[FingerPath]) -> tuple[str, ...]:
+def _resting(paths: Sequence[FingerPath], jammed: Sequence[Jam]) -> tuple[str, ...]:
     """Return the fingers that their springs press on the rock at zero tension."""
+    stuck = {jam.finger for jam in jammed}
     return tuple(
         name
-        for name, path in zip(FINGERS, paths, strict=False)
-        if (path.normals[-1] > 0.0).any() and not (path.engagement[-1] > 0.0).any()
+        for name, path in zip(FINGERS, paths, strict=True)
+        if name not in stuck and (path.normals[-1] > PATH_SETTINGS.pull).any()
     )

@@ -33,6 +33,8 @@ class PathSettings:
     20 N with which a closed finger bears on the rock, a fortieth."""
     moment: float = 0.05
     """The same of the moment [N·m], at a tenth of a metre from the hand's origin."""
+    pull: float = 1e-6
+    """Force beyond which spines pull, or a phalanx presses, at the end of a path [N]."""
     snap: float = 1e-9
     """Difference of tension over which a snap is drawn [N], so that paths are functions of it."""
 

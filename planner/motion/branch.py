@@ -100,7 +100,7 @@ class _Limb:
                 drift = self._drift(start, J)
             free = np.ones(len(angles))
             for _ in range(len(angles)):
-                step = free * (J.T @ np.linalg.solve((J * free) @ J.T + 1e-12 * np.eye(6), error))
+                step = _least_step(J * free, error)
                 # a joint at a limit that it would leave stays there
                 stuck = (angles <= chain.lower) & (step < 0.0)
                 stuck |= (angles >= chain.upper) & (step > 0.0)
@@ -158,6 +158,15 @@ class _Limb:
             stopped.append(f"a joint would turn by more than {step:g} rad at once")
         way, turn = np.linalg.norm(error[:3]) * chain.reach, np.linalg.norm(error[3:])
         return f"{', and '.join(stopped)}, {1e3 * way:.3g} mm and {turn:.2g} rad from the next pose"
+
+
+def _least_step(J: Array, error: Array) -> Array:
+    """Return the least step by which a hand's error vanishes, or gets least with few joints."""
+    small = J @ J.T if J.shape[1] > len(J) else J.T @ J
+    small = small + 1e-12 * np.eye(len(small))  # a stretched limb's is singular
+    if J.shape[1] > len(J):
+        return np.asarray(J.T @ np.linalg.solve(small, error))
+    return np.asarray(np.linalg.solve(small, J.T @ error))
 
 
 def follow_poses(robot: Robot, limb: str, start_angles: Array, poses: Sequence[Pose]) -> Array:
@@ -260,15 +269,15 @@ def branches(
     pose : Pose
         Pose of H in B.
     near : ndarray, shape (n,), optional
-        Angles that the first ones are to be nearest to; the middle of the joints' ranges by
-        default.
+        Angles that the first ones are to be nearest to [rad]; by default those come first whose
+        joints are farthest from their limits.
     count : int
         Number of solutions at most.
 
     Returns
     -------
     tuple of ndarray, shape (n,)
-        Joint angles within their limits, the nearest first [rad].
+        Joint angles within their limits [rad].
 
     Raises
     ------
@@ -276,9 +285,8 @@ def branches(
         If the deadline passes first.
     """
     batch = LimbBatch(robot, {limb: pose}, {}, np.zeros(3))
-    chain = robot.chains[limb]
-    middle = chain.rest if near is None else np.asarray(near, dtype=float)
-    angles = np.vstack([middle, postures_near(batch, 0, MOTION_SETTINGS.starts)])[:, None]
+    starts = postures_near(batch, 0, MOTION_SETTINGS.starts)
+    angles = (starts if near is None else np.vstack([near, starts]))[:, None]
     for _ in range(MOTION_SETTINGS.branch_steps):
         deadline.check("postures with a hand on its hold were found")
         errors, jacobians = batch.errors(angles)
@@ -288,8 +296,10 @@ def branches(
         angles[left] = damped_step(batch, angles[left], errors[left], jacobians[left])
     errors, _ = batch.errors(angles)
     solved = angles[np.abs(errors).max(axis=(1, 2)) <= MOTION_SETTINGS.pose_error, 0]
+    room = np.minimum(solved - batch.lower, batch.upper - solved).min(axis=1)
+    rank = -room if near is None else np.abs(solved - near).max(axis=1)
     found: list[Array] = []
-    for each in solved[np.abs(solved - middle).max(axis=1).argsort(kind="stable")]:
+    for each in solved[rank.argsort(kind="stable")]:
         if all(np.abs(each - other).max() > MOTION_SETTINGS.alike for other in found):
             found.append(each)
     return tuple(found[:count])

@@ -12,15 +12,15 @@ from hand_models.base import Array, Pose
 from planner.motion.branch import pose_between
 from planner.motion.compiled_capsules import capsule_distances
 from planner.motion.limb_capsules import LimbCapsules
-from planner.motion.rocks import Rock, rock_distances
+from planner.motion.rocks import Rock, distances_from_rock
 from planner.motion.settings import MOTION_SETTINGS
 from planner.robots import Robot
 from planner.scene import palm_capsule, unjoined_pairs
 
-__all__ = ["CollisionScene", "JointSpace", "Nearest"]
+__all__ = ["CollisionScene", "JointSpace", "NearestPair"]
 
 
-class Nearest(NamedTuple):
+class NearestPair(NamedTuple):
     """The two things that are nearest to each other.
 
     Attributes
@@ -88,16 +88,16 @@ class CollisionScene:
         Parameters
         ----------
         joints : mapping of str to ndarray, shape (n,)
-            Angles of each limb's joints [rad]; those of a limb left out are its rest angles.
+            Angles of limbs' joints [rad]; capsules of a limb left out are not numbers (NaN).
         """
-        found = np.empty((len(self.radii), 2, 3))
+        found = np.full((len(self.radii), 2, 3), np.nan)
         found[: len(self.body)] = self.body
-        for limb, capsules in self.limbs.items():
-            angles = np.asarray(joints.get(limb, self.robot.chains[limb].rest), dtype=float)
-            found[self.own[limb]] = capsules.segments(angles[None])[0]
+        for limb, angles in joints.items():
+            given = np.asarray(angles, dtype=float)[None]
+            found[self.own[limb]] = self.limbs[limb].segments(given)[0]
         return found
 
-    def nearest(self, body: Pose, joints: Mapping[str, Array]) -> Nearest:
+    def nearest(self, body: Pose, joints: Mapping[str, Array]) -> NearestPair:
         """Return what is nearest to each other at one posture, with all hands on their rock.
 
         A hand, with the links that its limb's last joint moves, may touch rock.
@@ -107,9 +107,9 @@ class CollisionScene:
         body : Pose
             Pose of B in W.
         joints : mapping of str to ndarray, shape (n,)
-            Angles of each limb's joints [rad]; those of a limb left out are its rest angles.
+            Angles of limbs' joints [rad]; a limb left out is not measured.
         """
-        limbs = self.robot.limbs
+        limbs = tuple(joints)
         # both ends of a motion of the body are where it is: so the body is measured, too
         whole = JointSpace(self, [body, body], joints, limbs, touching=limbs)
         return whole.nearest(whole.start)
@@ -128,9 +128,9 @@ class JointSpace:
     bodies : sequence of Pose
         Poses of B in W, one after the other; only one if the body stays.
     joints : mapping of str to ndarray, shape (n,)
-        Angles of each limb's joints [rad]; those of a limb left out are its rest angles.
+        Angles of limbs' joints [rad]; a limb left out is not measured.
     limbs : sequence of str
-        Limbs that move.
+        Limbs that move, of those in ``joints``.
     touching : collection of str
         Limbs whose hand holds rock: with the links that the last joint moves, it is not measured
         from its own (`Rock.limbs`), nor from what else it touches at the start.
@@ -152,9 +152,8 @@ class JointSpace:
     ) -> None:
         self.scene, self.limbs, self._bodies = scene, tuple(limbs), list(bodies)
         chains = [scene.robot.chains[limb] for limb in limbs]
-        given = [joints.get(limb, chain.rest) for limb, chain in zip(limbs, chains, strict=True)]
         progress = [0.0] if len(bodies) > 1 else []
-        self.start = np.concatenate([*given, progress])
+        self.start = np.concatenate([*(joints[limb] for limb in limbs), progress])
         self.lower = np.concatenate([*(chain.lower for chain in chains), progress])
         last = [len(bodies) - 1.0] if len(bodies) > 1 else []
         self.upper = np.concatenate([*(chain.upper for chain in chains), last])
@@ -164,9 +163,9 @@ class JointSpace:
         self._measured = np.concatenate(
             [*([np.arange(len(scene.body))] if last else []), *(scene.own[limb] for limb in limbs)]
         )
-        moves = np.zeros(len(scene.radii), dtype=bool)
-        moves[np.concatenate([scene.own[limb] for limb in limbs])] = True
-        self._pairs = scene.pairs[moves[scene.pairs].any(axis=1)]
+        known = np.asarray(np.isfinite(self._still[:, 0, 0]))[scene.pairs].all(axis=1)
+        moves = np.isin(scene.pairs, np.concatenate([scene.own[limb] for limb in limbs]))
+        self._pairs = np.ascontiguousarray(scene.pairs[known & moves.any(axis=1)])
         self._spread_points()
         self._met = np.ones((len(scene.rocks), len(self._measured)), dtype=bool)
         self._leave_out(touching)
@@ -254,7 +253,7 @@ class JointSpace:
         most, gaps = far + float((radii + self._gaps).max()), self._gaps
         for i, rock in enumerate(self.scene.rocks):
             there = rock.pose.inverse().apply(points.reshape(-1, 3))
-            away = rock_distances(rock.hold, there, most).reshape(count, -1)
+            away = distances_from_rock(rock.hold, there, most).reshape(count, -1)
             near = np.minimum.reduceat(away, self._first, axis=1)
             # the place of a segment that is nearest to the rock is so far from one of its points
             inner = np.sqrt(np.maximum(near * near - gaps * gaps, 0.0))
@@ -273,11 +272,11 @@ class JointSpace:
         """Return bounds of how much the distances change by steps (S, d), shape (S, P) [m]."""
         return np.asarray(np.abs(steps) @ self._levers.T)
 
-    def nearest(self, posture: Array) -> Nearest:
+    def nearest(self, posture: Array) -> NearestPair:
         """Return what is nearest to each other at a posture, shape (d,) [rad]."""
         distances = self.clearances(posture[None])[0]
         k = int(distances.argmin())
-        return Nearest(*self._named(k), float(distances[k]))
+        return NearestPair(*self._named(k), float(distances[k]))
 
     def _named(self, column: int) -> tuple[str, str]:
         """Return the names of the two things whose distance a column has."""

@@ -23,7 +23,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,33 +31,9 @@ from hand_models.base import Array, Pose, skew, turns_about, wrench_transport
 from hand_models.wrench_spaces import WRENCH_SCALE
 from planner.route.com_travel import mass_travel, turn_between
 from planner.route.held import Held, Posed, hold_with
+from planner.route.hold_rows import HoldRows
 
 __all__ = ["Passage"]
-
-
-class _Rows(NamedTuple):
-    """Rows of all hands that hold the robot, in all their loads y, shape (M,).
-
-    Attributes
-    ----------
-    used : ndarray, shape (k, M)
-        Change of the utilisation of each limit with the loads [1/N].
-    hard, most : ndarray, shapes (n, M), (n,)
-        Hard rows: hard y ≤ most.
-    changing : ndarray of bool, shape (k,)
-        True for limits whose rows change from the start to the end.
-    wrench : ndarray, shape (6, M)
-        Wrench on the rock in W, about the body's origin at the start.
-    passive : ndarray of bool, shape (M,)
-        True for loads that are no tensions.
-    """
-
-    used: Array
-    hard: Array
-    most: Array
-    changing: NDArray[np.bool_]
-    wrench: Array
-    passive: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +123,7 @@ class Passage:
         It is infinite if passive reactions cannot balance the deviation from the straight line.
         """
         ends = self.start.used, self.end.used
-        rows, changing = self._rows, self._rows.changing
+        rows, changing = self._rows, self._changing
         middle = self.posed(0.5)
         moving = [held.posed.moving for held in (self.start, self.end)]
         most = max(
@@ -195,34 +170,22 @@ class Passage:
     def _ends(self) -> Array:
         return np.cumsum([len(own) for own in self.start.loads])[:-1]
 
-    @cached_property
-    def _rows(self) -> _Rows:
+    @property
+    def _rows(self) -> HoldRows:
         """The rows of all hands, at the start."""
-        here, there = self.start.prepared.hands, self.end.prepared.hands
-        sizes = [len(space.columns) for space in here.spaces]
-        used, hard, most, changing, wrench = [], [], [], [], []
-        origin = self.start.posed.body.position
-        before = 0
-        for h, (space, other) in enumerate(zip(here.spaces, there.spaces, strict=True)):
-            after = sum(sizes) - before - sizes[h]
-            wide = ((0, 0), (before, after))
-            used.append(np.pad(space.L / space.s[:, None], wide))
-            hard.append(np.pad(space.H, wide))
-            most.append(space.h)
-            off = np.abs(space.L - other.L).max(axis=1) + np.abs(space.l0 - other.l0)
-            changing.append(off > 1e-9 * space.s)
-            pose = self.start.posed.hands[h].pose
-            about = wrench_transport(Pose(pose.position - origin, pose.rotation))
-            wrench.append(about @ space.generators)
-            before += sizes[h]
-        return _Rows(
-            np.concatenate(used),
-            np.concatenate(hard),
-            np.concatenate(most),
-            np.concatenate(changing),
-            np.hstack(wrench),
-            np.array([not n.endswith("/tension") for space in here.spaces for n in space.columns]),
-        )
+        return self.start.posed.rows
+
+    @cached_property
+    def _changing(self) -> NDArray[np.bool_]:
+        """True for limits whose rows change from the start to the end, shape (k,)."""
+        here, there = self.start.prepared.hands.spaces, self.end.prepared.hands.spaces
+        if here is there:
+            return np.zeros(len(self._rows.used), dtype=bool)
+        off = [
+            np.abs(one.L - two.L).max(axis=1) + np.abs(one.l0 - two.l0)
+            for one, two in zip(here, there, strict=True)
+        ]
+        return np.concatenate(off) > 1e-9 * np.concatenate([space.s for space in here])
 
     def _needed(self, posed: Posed) -> Array:
         """Return the wrench on the rock, in W about the start's body, shape (6,) [N, N·m]."""

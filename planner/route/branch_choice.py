@@ -56,6 +56,8 @@ def lasting(
 ) -> Iterator[Array]:
     """Yield those of a limb's joint angles that are clear, and stay so while the body moves.
 
+    Last come those that keep but the margin of hands at their holds.
+
     Parameters
     ----------
     scene : CollisionScene
@@ -84,14 +86,19 @@ def lasting(
         JointSpace(scene, [body], joints, (limb,), touching=touching)
         for body, touching in zip(bodies, ways, strict=True)
     ]
+    near: list[Array] = []
     for angles in candidates:
         try:
             after = [*follow_poses(robot, limb, angles, inside[1:])] if inside[1:] else []
         except BranchEndError:
             continue
         pairs = zip(spaces, [angles, *after], strict=True)
-        if all(space.clearances(at[None]).min() >= margin for space, at in pairs):
+        least = min(float(space.clearances(at[None]).min()) for space, at in pairs)
+        if least >= margin:
             yield angles
+        elif least >= scene_number("motion", "margin_at_hold"):
+            near.append(angles)
+    yield from near
 
 
 def candidates_on(

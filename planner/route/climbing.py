@@ -15,27 +15,24 @@ from dataclasses import replace
 from itertools import islice, pairwise
 
 import numpy as np
-from msgspec import structs
 
-from hand_models.base import Array, InvalidInputError, Pose, UnsupportedError
+from hand_models.base import Array, Pose
 from planner.motion import (
     BranchEndError,
-    CollisionScene,
     NoWayError,
     check_shift,
     pose_between,
-    rocks_of,
     shift_postures,
     swing,
 )
-from planner.prepare import posture, settle_each
+from planner.prepare import posture
 from planner.programs import CAP_SLACK
 from planner.question import HandOnHold
-from planner.robots import UnreachableError, solve_limbs
+from planner.robots import UnreachableError, scene_number, solve_limbs
 from planner.route.between import Passage
 from planner.route.branch_choice import bodies_until_lifted, candidates_on, lasting, start_joints
-from planner.route.climb import Move, Route, RouteStage, in_route, stages
-from planner.route.evaluation import must_touch
+from planner.route.climb import Move, Route
+from planner.route.first_checks import checked_stages, refuse, scene_of
 from planner.route.held import Held, MovingHand, NoPlanError, Posed, hold_as_planned, hold_with
 from planner.route.knots import Climb, Failure, Knot, KnotPhase
 from planner.route.moving import at_closing, closing_states, in_air, opening_states
@@ -76,7 +73,7 @@ def plan_climb(
     """
     if route.start.joints is None:
         route = replace(route, start=replace(route.start, joints="solve"))
-    _refuse(route)
+    refuse(route)
     planner, failure = _Planner(route, (settings or ClimbSettings()).complete()), None
     try:
         planner.begin()
@@ -87,39 +84,6 @@ def plan_climb(
     except _BlockedError as blocked:
         failure = blocked.failure
     return Climb(route, tuple(planner.knots), failure)
-
-
-def _refuse(route: Route) -> None:
-    """Refuse what a climb cannot have."""
-    places = [(f"stance.hands[{i}]", hand) for i, hand in enumerate(route.start.hands)]
-    places += [(f"moves[{i}]", move.hand) for i, move in enumerate(route.moves)]
-    for field, hand in places:
-        if hand.wrist != "fixed":
-            raise UnsupportedError(
-                f"{hand.wrist} is not available in a climb, whose loads are interpolated between "
-                "knots; valid is fixed",
-                field=f"{field}.wrist",
-            )
-        if hand.wrench is not None:
-            raise UnsupportedError(
-                "is not available in a climb, in which every hand is loaded and unloaded; leave it "
-                "out",
-                field=f"{field}.wrench",
-            )
-    if any(route.load.angular_acceleration):
-        raise UnsupportedError(
-            "is not available in a climb, whose loads are those at rest; leave it out",
-            field="load.angular_acceleration",
-        )
-    for i, move in enumerate(route.moves):
-        others = [] if isinstance(move.joints, str) else [*move.joints]
-        for limb in others:
-            if limb != move.hand.limb:
-                raise UnsupportedError(
-                    "is not available in a climb: a limb that stays keeps its branch of inverse "
-                    f"kinematics; give angles of {move.hand.limb} only",
-                    field=f"moves[{i}].joints.{limb}",
-                )
 
 
 class _BlockedError(Exception):
@@ -149,8 +113,8 @@ class _Planner:
     def __init__(self, route: Route, settings: ClimbSettings) -> None:
         self.knots: list[Knot] = []
         self._route, self._settings, self._numbers = route, settings, KnotNumbers.bundled()
-        self._stages = _stages_of(route)
-        self._scene = _scene_of(route)
+        self._stages = checked_stages(route)
+        self._scene = scene_of(route)
         self._stage = self._move = 0
         self._limb: str | None = None
         self._phase: KnotPhase = "start"
@@ -207,7 +171,8 @@ class _Planner:
                 off = max(off, float(np.linalg.norm(away, axis=1).max()))
             if off <= numbers.slack:
                 break
-        seen = check_shift(self._scene, [first.body, *bodies], ways)
+        margin = scene_number("motion", "margin_at_hold")
+        seen = check_shift(self._scene, [first.body, *bodies], ways, margin=margin)
         if not seen.clear:
             raise NoPlanError(f"while the body shifts, {seen.nearest}")
         for k, body in enumerate(bodies, start=1):
@@ -388,24 +353,3 @@ class _Planner:
             knot = replace(knot, time=time)
         self.knots.append(knot)
         self._stage += stage
-
-
-def _stages_of(route: Route) -> tuple[RouteStage, ...]:
-    """Return the stages of a route, whose fields are checked; moves must end on rock."""
-    found = tuple(stages(replace(route, limits=structs.replace(route.limits, tension_change=None))))
-    for stage in found:
-        if stage.phase == "place":
-            try:
-                must_touch(stage)
-            except InvalidInputError as error:
-                raise in_route(error, stage.paths) from None
-    return found
-
-
-def _scene_of(route: Route) -> CollisionScene:
-    """Return the robot with all rock of a climb."""
-    robot = route.start.robot
-    hands = [*route.start.hands, *(move.hand for move in route.moves)]
-    settled = settle_each(robot.hand, hands)
-    closed = [each for each in settled if not isinstance(each, InvalidInputError)]
-    return CollisionScene(robot, rocks_of(zip(hands, closed, strict=True)))

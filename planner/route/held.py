@@ -20,8 +20,9 @@ from planner.question import HandOnHold, Question, Stance
 from planner.result import LimitName, LoadRecovery, PlanArrays
 from planner.robots import LinkTree
 from planner.route.climb import Route
+from planner.route.hold_rows import HoldRows
 from planner.route.knots import HandKnot
-from planner.solving import Checks, Solution, Verified, answer_on
+from planner.solving import Checks, Solution, Verified, answer_on, idle_joints
 from planner.verification import Check
 
 __all__ = ["Held", "MovingHand", "NoPlanError", "Posed", "hold_as_planned", "hold_with"]
@@ -116,6 +117,18 @@ class Posed:
         parts = assemble(question, self.posture, self.needed)
         return PreparedStance(question, self.posture, *parts, self.needed)
 
+    @cached_property
+    def recovery(self) -> LoadRecovery:
+        """Conversion of the hands' loads to a plan's numbers."""
+        hands = self.prepared.hands
+        return LoadRecovery(self.prepared.batch, hands.spaces, hands.scaled)
+
+    @cached_property
+    def rows(self) -> HoldRows:
+        """The rows of the hands that hold the robot; moments about the body's origin."""
+        poses = [hand.pose for hand in self.hands]
+        return HoldRows.of(self.prepared.hands.spaces, poses, self.body.position)
+
     def beside(self, moving: MovingHand | None, angles: Array | None = None) -> Posed:
         """Return the posture with another state of the moving hand, while all others hold still.
 
@@ -132,6 +145,7 @@ class Posed:
         if moving is not None and moving.on_rock:
             question = replace(question, body_wrench=found.needed)
         before = self.prepared
+        found.__dict__.update(recovery=self.recovery, rows=self.rows)
         found.__dict__["prepared"] = PreparedStance(
             question, found.posture, before.batch, before.hands.turned(found.needed), found.needed
         )
@@ -273,7 +287,8 @@ def hold_as_planned(posed: Posed, near: Solution | None = None, press: float = 0
         fingers are overloaded.
     """
     prepared = posed.prepared
-    checks = Checks.of(prepared)
+    check = Check(prepared.question, prepared.batch, prepared.where)
+    checks = Checks(check, posed.recovery, idle_joints(prepared))
     asked = _pressing(prepared, press) if press > 0.0 else prepared
     found = answer_on(asked, time.perf_counter(), checks, near, prove=press == 0.0)
     answer = found.answer
@@ -308,8 +323,7 @@ def hold_with(posed: Posed, loads: Sequence[Array]) -> Held:
         If the loads do not pass the checks.
     """
     prepared = posed.prepared
-    recovery = LoadRecovery(prepared.batch, prepared.hands.spaces, prepared.hands.scaled)
-    arrays, used, _ = recovery.read(loads)
+    arrays, used, _ = posed.recovery.read(loads)
     held = Held(posed, prepared, tuple(loads), arrays, used)
     # the check knows of no wrench of a hand beside those of the stance
     air = replace(posed, moving=None)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from hand_models.base import Pose, turns_about
-from hand_models.rock import Cylinder, Mesh, Profile
+from hand_models.rock import Cylinder, Profile
 from planner.motion import CollisionScene, JointSpace, Rock, rocks_of
 from planner.motion.compiled_capsules import capsule_distances
 from planner.motion.limb_capsules import LimbCapsules
@@ -87,7 +87,7 @@ def test_links_are_as_far_from_rock_as_coal_says(hold):
     angles = np.array([rng.uniform(-1.0, 1.0, 7) for _ in range(60)])
     body = Pose(np.array([-0.7, -0.2, -0.1]), turns_about([0.1, 0.2, 0.3]))
     scene = CollisionScene(ROBOT, [Rock("rock", hold, Pose.identity(), frozenset())])
-    space = some_space(scene, {}, ("front_left",), [body])
+    space = some_space(scene, {"front_left": angles[0]}, ("front_left",), [body])
     found = space.clearances(angles)[:, -len(scene.own["front_left"]) :]
     segments = body.apply(scene.limbs["front_left"].segments(angles).reshape(-1, 3))
     radii = scene.radii[scene.own["front_left"]]

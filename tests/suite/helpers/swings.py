@@ -9,10 +9,18 @@ from hand_models.rock import Hold, Mesh, Plane, Sphere
 from planner.motion import CollisionScene, Rock, clear_branches
 from planner.robots import robosimian
 from tests.suite.helpers.rocks import fractal_wall
-from tests.suite.helpers.stances import PALM_TO_WALL, PLACES, wall
+from tests.suite.helpers.stances import PALM_TO_WALL, wall
 
-BODY = Pose(0.42 * wall()[:, 2], wall())
-"""B, parallel to the wall and 0.42 m off it."""
+BODY = Pose(0.5 * wall()[:, 2], wall())
+"""B, parallel to the wall and 0.5 m off it."""
+
+PLACES = {
+    "front_right": (0.65, -0.5),
+    "rear_right": (-0.4, -0.6),
+    "rear_left": (-0.4, 0.6),
+    "front_left": (0.65, 0.5),
+}
+"""Of the hands on the wall [m]."""
 
 ROBOT = robosimian()
 
