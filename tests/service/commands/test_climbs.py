@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import msgspec
 import numpy as np
 import pytest
 
+import planner
 from service.bulk import read_climb_summary, read_trajectory
 from service.commands.cli import run_command_line
 from service.replies import ClimbFailureReply, KnotReply
@@ -98,6 +100,22 @@ def test_one_stage_is_shown_as_crux_plan_shows_it_and_written(written, tmp_path,
     assert "is for one route" in complaint(capfd)
     assert run_command_line(["route", route]) == BAD_INPUT
     assert "give -o DIR, or --stage K" in complaint(capfd)
+
+
+def test_the_largest_change_of_a_tension_counts_between_knots(tmp_path, capfd):
+    limits = planner.Limits(tension_change=8.0)
+    route = msgspec.structs.replace(two_moves(), limits=limits, moves=two_moves().moves[:1])
+    flags = ["-o", str(tmp_path), "--json"]
+    assert run_command_line(["route", file_of(route, tmp_path), *flags]) == DONE
+    knots = read_trajectory(tmp_path)
+    steps = [
+        np.abs(np.subtract(now.tensions, before.tensions)).max()
+        for one, two in pairwise(knots)
+        for before, now in zip(one.hands, two.hands, strict=True)
+    ]
+    assert 7.0 < max(steps) <= 8.0 + 1e-9
+    (file,) = (tmp_path / "stages").glob("01-*.json")
+    assert json.loads(file.read_bytes())["limits"].get("tension_change") is None
 
 
 def test_a_climb_that_fails_says_where_and_why(tmp_path, capfd):
