@@ -75,7 +75,8 @@ class Route:
     load : Load
         Mass, payloads and acceleration of the body, the same in every stage.
     limits : Limits
-        Limits of every stage. A cap on a hand's force counts while the hand is on the rock.
+        Limits of every stage. A cap on a hand's force counts while the hand is on the rock;
+        ``tension_change`` counts between knots of a `Climb` instead.
     objective : {'max_margin', 'min_effort', 'max_reliability', 'max_robust'}
         Objective of every stage.
     explain : bool
@@ -261,7 +262,7 @@ def stages(route: Route) -> Iterator[RouteStage]:
         question = Question(
             stance,
             load=route.load,
-            limits=structs.replace(route.limits, per_hand=caps),
+            limits=structs.replace(route.limits, per_hand=caps, tension_change=None),
             want=route.want | {"load_factor"},
             draws=route.draws,
             objective=route.objective,

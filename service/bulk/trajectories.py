@@ -93,7 +93,7 @@ def read_trajectory(folder: Path) -> list[KnotReply]:
 
 
 class ClimbOutcome(msgspec.Struct):
-    """What a summary says of a climb's end: ``failure`` is None if it runs from end to end."""
+    """End of a climb in a summary: ``failure`` is None if it runs from end to end."""
 
     failure: ClimbFailureReply | None
 

@@ -257,9 +257,9 @@ def crux() -> None:
     STANCE is the path of a JSON or TOML file with a plan request, - for standard input, or the name
     of a bundled stance: boulders, ledge, overhang, slab, wall, wall-300, wall-300-floating,
     wall-300-joints, wall-700.
-    ROUTE is the same for a climb; mars-slab and six-moves are bundled. LIMB is front_right,
-    rear_right, rear_left or front_left. --hand FILE puts numbers of your own in place of the
-    bundled hand's, --robot FILE a robot of your own in place of RoboSimian.
+    ROUTE is the same for a climb; knobs, knobs-blocked and six-moves are bundled. LIMB is
+    front_right, rear_right, rear_left or front_left. --hand FILE puts numbers of your own in place
+    of the bundled hand's, --robot FILE a robot of your own in place of RoboSimian.
 
     Exit status: 0 done and feasible, 3 done but overloaded or infeasible, 2 bad input (one line on
     standard error names the field), 1 anything else.

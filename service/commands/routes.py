@@ -5,19 +5,17 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import click
 import msgspec
 
 import planner
 from hand_models.base import (
-    Array,
     CruxError,
     InvalidInputError,
     UnsupportedError,
@@ -27,6 +25,9 @@ from hand_models.base import (
 from service import answering, bulk, replies, requests, tables, wire
 from service.commands import options, stances
 from service.commands.batch import answer_rest, complain, exit_status, new_run
+
+if TYPE_CHECKING:
+    from hand_models.base import Array
 
 __all__ = ["route_command"]
 
@@ -207,8 +208,9 @@ def _stage(asked: _Asked, index: int, file: Path | None, own: options.Own, as_js
             f"must be below {len(known)}, the number of stages, got {index}", field="--stage"
         )
     stage = known[index]
-    with tables.working(f"planning the moves of {route.name} up to stage {index}"):
-        climb = _climb(replace(route, moves=route.moves[: stage.move]))
+    # later moves have a say in the joint angles, so that they can be kept
+    with tables.working(f"planning the moves of {route.name}"):
+        climb = _climb(route)
     knots = () if climb is None else climb.knots
     joints = next((knot.joints for knot in knots if knot.stage == index), None)
     request = options.with_extras(asked.stage(stage, joints), whole=not as_json)

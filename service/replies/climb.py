@@ -137,7 +137,7 @@ class ClimbFailureReply(Struct, kw_only=True):
 
 
 class ClimbSetPoints(Struct, kw_only=True):
-    """What a controller is to follow at one time of a climb: published, not asked for.
+    """Set-points that a controller is to follow at one time of a climb: published, not asked for.
 
     - ``v``: version of the messages, 1.
     - ``number``: number of the set-points from zero; each one is one more than the one before.

@@ -40,12 +40,14 @@ def test_a_stage_with_joints_is_planned_alike_alone(index):
     (knot,) = (knot for knot in climb.knots if knot.stage == index)
     for limb, angles in knot.joints.items():
         assert np.allclose(reply.joints[limb], angles, **EXACT)
-    assert np.isclose(reply.utilisation, knot.utilisation, **EXACT)
+    # a knot is solved from the one before it: the same plan but for what a solver leaves
+    near = {"rtol": 0.0, "atol": 1e-6}
+    assert np.isclose(reply.utilisation, knot.utilisation, **near)
     loads = {hand.limb: hand for hand in reply.hands}
     for hand in knot.hands:
         if hand.on_rock:
             tensions = [each.tendon_tension for each in loads[hand.limb].fingers]
-            assert np.allclose(tensions, hand.tensions, **EXACT)
+            assert np.allclose(tensions, hand.tensions, **near)
 
 
 def test_stages_without_joints_keep_load_limits_and_caps():

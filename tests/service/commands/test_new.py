@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from service.bulk import read_trajectory
 from service.commands.cli import run_command_line
 from service.commands.stances import limbs_of, read_request, read_route
 from tests.suite.helpers.commands import BAD_INPUT, DONE, complaint, result
@@ -44,14 +45,14 @@ def test_a_new_stance_is_planned_as_the_bundled_wall(start, capfd):
     assert all(len(hand["seating"]["pose"]["orientation"]) == 4 for hand in found["hands"])
 
 
-def test_a_new_route_is_the_beginning_of_the_bundled_one(start, tmp_path):
-    file = start("route")
-    assert run_command_line(["route", str(file), "-o", str(tmp_path / "out"), "--json"]) == DONE
+def test_a_new_route_starts_as_a_bundled_one_and_runs_from_end_to_end(start, tmp_path):
+    file, out = start("route"), tmp_path / "out"
+    assert run_command_line(["route", str(file), "-o", str(out), "--json"]) == DONE
     found, bundled = read_route(str(file)), read_route("six-moves")
-    assert [move.limb for move in found.moves] == [move.limb for move in bundled.moves[:2]]
-    for one, two in zip(found.moves, bundled.moves, strict=False):
-        assert one.hold == two.hold
-        assert one.pose.position == two.pose.position
+    for one, two in zip(found.stance.hands, bundled.stance.hands, strict=True):
+        assert (one.limb, one.hold, one.pose.position) == (two.limb, two.hold, two.pose.position)
+    knots = read_trajectory(out)
+    assert [knot.move for knot in knots if knot.phase == "load" and knot.stage] == [1, 2]
 
 
 @pytest.mark.parametrize(("kind", "option"), [("robot", "--robot"), ("hand", "--hand")])

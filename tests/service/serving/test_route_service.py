@@ -51,7 +51,7 @@ def test_the_trajectory_of_a_reply_is_that_of_the_planner(client):
 def test_a_reply_says_where_a_climb_fails(client):
     reply = client.route(asked(blocked(), "trajectory"))
     assert reply.failure == ClimbFailureReply.of(failed().climb.failure)
-    assert reply.trajectory[-1].move == 2
+    assert (reply.failure.move, reply.trajectory[-1].stage) == (2, 2)
 
 
 def test_without_a_trajectory_stages_alone_are_planned(client):

@@ -32,11 +32,9 @@ def two_moves() -> RouteRequest:
 
 
 def blocked() -> RouteRequest:
-    """Return a route of one move that succeeds, and one in whose way a link is in rock."""
-    found = two_moves()
-    return replace(
-        found, name="blocked", moves=[found.moves[0], _raised(found, "front_right", 0.1)]
-    )
+    """Return a route of two moves, whose stages hold, with a shift that a limb cannot follow."""
+    bundled = read_route("six-moves")
+    return replace(bundled, name="blocked", moves=bundled.moves[:2])
 
 
 def _raised(route: RouteRequest, limb: str, by: float) -> Any:
