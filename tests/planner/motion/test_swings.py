@@ -115,6 +115,18 @@ def test_a_way_around_a_boulder_is_searched():
     check_whole(scene, other)
 
 
+def test_a_swing_is_the_same_wherever_the_world_begins():
+    by = Pose(np.array([2.0, -1.0, 5.0]), turns_about([0.4, 2.0, -1.0]))
+    rocks = [rock(rough()), ball((0.2, 0.9, 0.1))]
+    here = CollisionScene(ROBOT, rocks)
+    there = CollisionScene(ROBOT, [each._replace(pose=by @ each.pose) for each in rocks])
+    found = swing(here, BODY, posture(), LIMB, goals(here))
+    moved = swing(there, by @ BODY, posture(), LIMB, goals(here))
+    assert moved.path == pytest.approx(found.path, abs=1e-9)
+    assert moved.nearest[:2] == found.nearest[:2]
+    assert moved.bound == pytest.approx(found.bound, abs=1e-9)
+
+
 def test_of_several_ends_a_later_one_may_have_the_straight_way():
     scene = blocked()
     hard, easy = goals(scene, (0.95, 0.25))[0], goals(scene, (0.7, 0.75))[0]
