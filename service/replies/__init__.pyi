@@ -1,4 +1,10 @@
 from .diagnosis import DiagnosisReply as DiagnosisReply, SuspectReply as SuspectReply
+from .opening import (
+    JamReply as JamReply,
+    OpeningKnot as OpeningKnot,
+    OpeningReply as OpeningReply,
+    TileEventReply as TileEventReply,
+)
 from .plan import (
     BriefPlanReply as BriefPlanReply,
     CertificateReply as CertificateReply,
