@@ -43,8 +43,8 @@ class JamReply(Struct, kw_only=True):
     """A finger that does not let go.
 
     - ``finger``: its name.
-    - ``friction``: of the surface, above which its spines would let go at zero tension; null where
-      no balance was found on the way.
+    - ``friction``: of the surface, above which the first of its spines would let go at zero
+      tension; null where no balance was found on the way.
     - ``reason``: a sentence.
     """
 

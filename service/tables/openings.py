@@ -35,9 +35,7 @@ def print_opening(opening: OpeningReply, out: Console) -> None:
     if opening.resting:
         names = ", ".join(opening.resting)
         out.print(f"at zero tension springs press these fingers on the rock: {names}")
-    out.print(
-        f"spines let go below {opening.friction:.3g} N of shear for a newton of pull"
-    )
+    out.print(f"spines let go below {opening.friction:.3g} N of shear for a newton of pull")
     if opening.retreat is None:
         out.print("no retreat by a finger's length clears the straight fingers of the rock")
     else:

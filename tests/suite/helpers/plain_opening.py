@@ -84,20 +84,41 @@ class PlainOpening:
         self.let_go: list[tuple[int, float]] = []
 
     def beside(self, q: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return gaps, shares, and arms (3, 3) of unit shears and normal forces about joints."""
+        """Return what is beside the phalanges.
+
+        Gaps, shares, arms (3, 3) of unit shears and normal forces about joints; and places of
+        contacts and unit vectors of normal forces, as complex numbers in F.
+        """
         joints, u = fan_out(q, self.shape.end)
         within = self.depth + 1e-4
         near = phalanges.points_near(self.rock, self.shape, joints, u, within)
         found = phalanges.beside(self.rock, self.shape, joints, u, self.depth, near)
-        share = engaged_share(found.tile_gap, self.shape.travel, self.shape.exponent)
+        share = np.array(list(map(self.on_rock, joints, u, found.tile_gap)))
         share = engaged_share(1.0 - share * found.push.imag, 1.0)
         arms = (joints + found.place * u)[None, :] - joints[:, None]
         arms = np.triu(arms * (found.push / 1j * u).conj()[None, :])
-        return found.gap, share, -arms.imag, -arms.real
+        return found.gap, share, -arms.imag, -arms.real, joints + found.place * u, found.push * u
+
+    def on_rock(self, joint: complex, u: complex, tile_gap: float) -> float:
+        """Return the share of a tile's spines that reach the rock: the mean over its strips."""
+        s, behind = self.shape, self.rock.behind[0]
+        seen = (self.rock.places[0] - joint) * u.conjugate()
+        away = np.abs(seen - seen.real.clip(s.near, s.far) - 1j * s.lift)
+        near = away - away.min(initial=math.inf) + tile_gap < s.travel
+        farther = np.zeros(1)
+        if behind.shape[1] > 1 and near.any():
+            farther = (away[near, None] + behind[near]).min(axis=0) - away.min()
+        return float(np.mean(engaged_share(tile_gap + farther, s.travel, s.exponent)))
+
+    def contacts(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return places (x, z) of contacts in F [m], and forces on the rock there [N], (3, 2)."""
+        forces = (self.normals + 1j * self.shears) * self.pushes
+        places, forces = (np.column_stack([each.real, each.imag]) for each in (self.places, forces))
+        return places, forces
 
     def torque(self, q: np.ndarray, tension: float) -> np.ndarray:
         """Return the torque on each joint, and note the loads."""
-        gap, share, along, across = self.beside(q)
+        gap, share, along, across, self.places, self.pushes = self.beside(q)
         law = self.drag * self.closing - self.gain * (self.closing - tension)
         held = np.minimum(share, self.grip)
         law, held = held * law, (held > 0.0) & (law >= 0.0)
