@@ -29,6 +29,7 @@ from .explanation import (
 from .pictures import (
     plot_body_space as plot_body_space,
     plot_com_region as plot_com_region,
+    plot_opening as plot_opening,
     plot_plan as plot_plan,
     plot_redundancy as plot_redundancy,
     plot_route_survival as plot_route_survival,

@@ -164,7 +164,7 @@ def _followed(
         put_forces(SETTINGS_RECORD, CODE_RECORD, drive, after, there, now)
         left = _judged(*fixed, state, around, after, there, now)
         if left < np.inf:
-            if course is not None and left <= SETTINGS.balanced_torque * drive["torque"][0]:
+            if course is not None and left <= SETTINGS.balanced * drive["torque"][0]:
                 course.append(Balanced(after.copy(), there.copy(), now.copy()))
             state, after, around, there = after, state, there, around
     return state, around, False
@@ -190,7 +190,7 @@ def _begun(settings: Record, code: Record, state: Record, around: Record, trial:
         lets = state.mode[j] == code.held and not caught
         trial.mode[j] = code.off if lets else state.mode[j]
         trial.q[j], trial.stop[j], trial.spines[j] = state.q[j], state.stop[j], state.spines[j]
-        trial.been[j], trial.off[j] = state.been[j], state.off[j]
+        trial.been[j], trial.off[j], trial.most[j] = state.been[j], state.off[j], state.most[j]
         trial.normals[j], trial.slides[j] = state.normals[j], state.slides[j]
     return least
 
@@ -280,6 +280,7 @@ def _increment(
         if now.off[j] > state.off[j]:
             after.least[j] = max(around.gap[j], 0.0)
         after.spines[j] = now.spines[j]
+        after.most[j] = state.most[j] if now.spines[j] == code.caught else 0.0
         lost = around.gap[j] > after.least[j] + settings.lost_gap * shape.length
         if now.spines[j] == code.pulled and lost and not drive.lowers:
             after.spines[j] = code.lost
@@ -302,8 +303,7 @@ def _increment(
     beside = size > settings.path_turn and opens and not air
     if drive.lowers:
         # from balance to balance
-        beside |= size > settings.balance_turn
-        beside |= state.damping * size > settings.balanced_torque * drive.torque
+        beside |= max(state.unbalanced, state.damping * size) > settings.balanced * drive.torque
     if waits or turns_back or beside or size > most or now.clear < 1.0:
         more = 0.0
     part = min(now.clear, most / max(size, settings.still_turn)) * (0.5 if turns_back else 1.0)
@@ -385,9 +385,11 @@ def _judged(
         return float(np.inf)
     for j in range(JOINT_COUNT):
         # spines of a finger that opens catch nothing anew
-        grip = max(around.share[j] - after.off[j], 0.0)
         if drive.lowers:
-            after.off[j] = max(after.off[j], there.share[j] - grip)
+            if most <= settings.balanced * drive.torque:
+                after.most[j] = min(after.most[j], there.share[j])
+            after.off[j] = max(there.share[j] - after.most[j], 0.0)
+    after.unbalanced = most
     growth = 2.0 if wrong < settings.exact_torque * drive.torque else 1.3
     after.stride = min(growth * after.stride, settings.most_stride)
     # a damped increment that was as foreseen may be damped less

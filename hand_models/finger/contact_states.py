@@ -58,8 +58,13 @@ at most 1, before another phalanx reaches the rock. ``gap``: gaps after the part
 
 
 @compiled()
-def _held(settings: Record, share: float, off: float) -> float:
+def _held(
+    settings: Record, code: Record, drive: Record, state: Record, around: Record, j: int
+) -> float:
     """Return the share of a tile's spines that grip the rock, φ − ψ."""
+    share, off = around.share[j], state.off[j]
+    if drive.lowers:
+        off = max(share - state.most[j], 0.0) if state.spines[j] == code.caught else share
     held = 1.0 - max(1.0 - share + off, 0.0)
     return held if held > settings.least_share else 0.0
 
@@ -80,7 +85,7 @@ def _write_forces(
     normals, d_shears = np.empty(JOINT_COUNT), np.empty(JOINT_COUNT)
     for j in range(JOINT_COUNT):
         off = state.mode[j] == code.off
-        share = _held(settings, around.share[j], state.off[j])
+        share = _held(settings, code, drive, state, around, j)
         dragged = state.been[j] or state.mode[j] == code.on
         # where a joint's stop carries what a phalanx does, its spines are drawn in by nothing
         bears = share > 0.0 and (not off or state.stop[j] == 0)
@@ -88,11 +93,11 @@ def _write_forces(
         if bears:
             drag = drive.drag[j] * (1.0 if dragged else part)
         found.shears[j], d_shears[j] = drag * share * f, drag * f
-        # per newton of s
         found.grows[j] = 0.0
         if drive.lowers and bears:
-            d_shears[j] = drive.drag[j] * drive.closing - drive.gain[j] * state.s
-            found.shears[j], found.grows[j] = share * d_shears[j], -share * drive.gain[j]
+            whole = drive.drag[j] * drive.closing - drive.gain[j] * state.s
+            found.shears[j], found.grows[j] = share * whole, -share * drive.gain[j]
+            d_shears[j] = whole if around.share[j] < state.most[j] else 0.0
         elif closing:
             found.grows[j] = drag * share
         elif bears and not dragged:
@@ -180,8 +185,7 @@ def _solve(
             b[i, 0], b[i, 1] = found.torque[i], found.slope[i]
             for k in range(n):
                 A[i, k] = found.damped[i, k]
-                if found.active[k]:
-                    A[i, n + k] = found.arms[i, k]
+                A[i, n + k] = found.arms[i, k] if found.active[k] else 0.0
         if found.active[i]:
             for k in range(n):
                 A[n + i, k] = around.d_gap[i, k]
@@ -230,9 +234,7 @@ def _code(state: Record, around: Record) -> int:
     """Return a number for a contact state."""
     code = 0
     for j in range(JOINT_COUNT):
-        code = 3 * code + state.mode[j]
-        code = 3 * code + state.stop[j] + 1
-        code = 3 * code + state.spines[j]
+        code = 27 * code + 9 * state.mode[j] + 3 * (state.stop[j] + 1) + state.spines[j]
         code = 3 * code + (1 if around.share[j] > state.off[j] else 0) + state.slides[j]
     return code
 
@@ -257,7 +259,7 @@ def _try(
             found.damped[j, k] = found.stiffness[j, k] + (state.damping if j == k else 0.0)
         found.active[j] = state.mode[j] != code.off
         apart[j] = around.gap[j] - (least[j] if state.mode[j] == code.held else 0.0)
-        share[j] = _held(settings, around.share[j], state.off[j])
+        share[j] = _held(settings, code, drive, state, around, j)
         found.caught[j] = share[j] > 0.0
     _solve(settings, drive, state, around, apart, found)
     # gaps that close, by no more than the first of them has room

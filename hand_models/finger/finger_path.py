@@ -8,7 +8,7 @@ down from the closing tension f_c to zero, and these laws in place of those of c
   drags the tile to the finger's base, but the tile's spring pushes it away;
 - a tile that is pressed is dragged backwards by Coulomb friction at most: T_j ≥ −μ N_j;
 - spines in pull let go unless their shear, as it is now, is at least μ times the pull;
-- nothing is caught anew: φ_j never grows.
+- nothing is caught anew: φ_j is at most the least share in the finger's balances so far.
 
 Without the friction μ most fingers would not open. A finger whose spines still pull at zero tension
 is *jammed*.
@@ -124,6 +124,7 @@ def opening_paths(
         )
         sides = {"upper": 1, "lower": -1}
         start["stop"][i] = [sides.get(str(contact.stop), 0) for contact in finger.contacts]
+        start["most"][i] = share
         start["off"][i] = np.maximum(around["share"][i] - share, 0.0)
         start["least"][i] = np.where(caught, np.maximum(gap, 0.0), np.inf)
         start["normals"][i] = np.where(near | held, normals, 0.0)

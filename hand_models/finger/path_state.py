@@ -101,8 +101,8 @@ STATE_FIELDS: Final = np.dtype(
         ("q", float, _EACH_JOINT),
         ("s", float),
         *((name, int, _EACH_JOINT) for name in ("mode", "stop", "spines", "been", "slides")),
-        *((name, float, _EACH_JOINT) for name in ("off", "least", "normals", "touches")),
-        *((name, float) for name in ("damping", "stride")),
+        *((name, float, _EACH_JOINT) for name in ("off", "most", "least", "normals", "touches")),
+        *((name, float) for name in ("damping", "stride", "unbalanced")),
         *((name, float, _EACH_JOINT) for name in ("step", "left")),
     ]
 )
@@ -119,8 +119,10 @@ that were pulled off and have not caught again. ``least``: m, least gap since th
 after a pull-off, the gap at which it happened [m]. ``normals``: normal load of each contact [N].
 ``touches``: value of ``s`` at which the phalanx first touched the rock [N]; NaN if it never did.
 ``damping``, ``stride``: damping D of the joints [N·m/rad]; largest turn of a joint in the next
-increment [rad]. ``step``: turn of the joints in the last increment [rad]. ``left``: torque residual
-that the linearisation predicts after it [N·m].
+increment [rad]. ``unbalanced``: largest torque left after the last increment [N·m]. ``most``: of a
+finger that opens, the least share of each tile's spines in its balances so far. ``step``: turn of
+the joints in the last increment [rad]. ``left``: torque residual that the linearisation predicts
+after it [N·m].
 """
 
 

@@ -76,7 +76,7 @@ class FingerSettings:
     damped_torque: float = 0.3
     """Largest difference between torques and their linearisation: to lengthen the stride, to
     stay on the path, and as a share of the torque that damping leaves."""
-    balanced_torque: float = 1e-3
+    balanced: float = 1e-3
     """Largest torque that is left where a finger on its path counts as balanced."""
     balance: float = 1e-8
     late_balance: float = 5e-7

@@ -64,8 +64,8 @@ class Jam(NamedTuple):
     ----------
     finger : str
     friction : float or None
-        The least friction μ of the surface with which its spines would let go at zero tension;
-        None if no equilibrium was found on the way.
+        Friction μ of the surface above which the first of its spines would let go at zero
+        tension; None if no equilibrium was found on the way.
     reason : str
         One sentence.
     """
@@ -161,7 +161,7 @@ def _path(hand: SettledHand, force: float, *, opens: bool) -> HandPath:
             else closing_paths(hand.hand.finger, opened)
         )
     parts = [
-        *phalanx_parts(hand, paths, opens=opens),
+        *(phalanx_parts(hand, paths, opens=opens) if paths else ()),
         *base_parts(hand, opens=opens),
         *nail_parts(hand, opens=opens),
     ]
@@ -231,8 +231,8 @@ def _jams(hand: SettledHand, paths: Sequence[FingerPath]) -> Iterator[Jam]:
             yield Jam(
                 name,
                 needed,
-                f"the spines of {name} ({names}) hold at zero tension; they would let go if the "
-                f"surface's friction were above {needed:.3g}, it is {mu:.3g}",
+                f"the spines of {name} ({names}) hold at zero tension; the first would let go if "
+                f"the surface's friction were above {needed:.3g}, it is {mu:.3g}",
             )
 
 

@@ -1,6 +1,7 @@
 from .body_plots import plot_body_space as plot_body_space
 from .com_plots import plot_com_region as plot_com_region
 from .hand_plots import plot_wrench_space as plot_wrench_space
+from .opening_plots import plot_opening as plot_opening
 from .plan_plots import draw_plan as draw_plan, plot_plan as plot_plan
 from .redundancy_plots import plot_redundancy as plot_redundancy
 from .report import summary as summary, write_report as write_report

@@ -108,6 +108,8 @@ class LinkTree:
         for joint, turn, shift in zip(self._joints, turns, moved * slides, strict=True):
             at = joint.place @ Pose(shift, turn)
             found[joint.child] = found[joint.parent] @ at
+        if self.robot.description.body == self.links[0].name:
+            return found
         from_body = found[self.robot.description.body].inverse()
         return {name: from_body @ pose for name, pose in found.items()}
 

@@ -17,6 +17,7 @@ from hand_models.fixed_wrist import (
     tension_limits,
 )
 from hand_models.hand import FINGERS, SettledHand, SettledTile, closing_sequence, nearby_closures
+from hand_models.opening import HandPath, clear_retreat, opening_path
 from hand_models.wrench_spaces import WrenchSpace
 from planner import WristPlan, deadline, resting_hand
 from service import replies
@@ -102,13 +103,17 @@ def answer_wrench_space(
         capability=None,
     )
     _add_views(reply, hand.space, request.want)
-    if "robust" in (request.want or ()):
-        if hand.palm is not None:
+    for name in ("robust", "opening"):
+        if name in (request.want or ()) and hand.palm is not None:
             raise InvalidInputError(
-                f"'robust' requires fixed wrists on all hands; that of {request.limb} is not "
-                "fixed: give it wrist 'fixed', or remove 'robust'",
+                f"{name!r} requires fixed wrists on all hands; that of {request.limb} is not "
+                f"fixed: give it wrist 'fixed', or remove {name!r}",
                 field="want",
             )
+    if "opening" in (request.want or ()):
+        deadline.check("it was known how the hand lets go")
+        reply.opening = _opening(opening_path(settled), clear_retreat(settled))
+    if "robust" in (request.want or ()):
         both_ways = np.vstack([np.eye(len(WRENCH_AXES)), -np.eye(len(WRENCH_AXES))])
         pure = force_directions(PURE_WAYS)
         reply.robust = _robust(robustness(asked.robot.hand, settled, both_ways, pure=pure))
@@ -185,6 +190,26 @@ def _robust(found: Robustness) -> replies.RobustCapability:
         pure_tenth=dict(zip(PURE_WAYS, found.pure_tenth.tolist(), strict=True)),
         share=dict(zip(PURE_WAYS, found.share.tolist(), strict=True)),
         force=found.force,
+    )
+
+
+def _opening(path: HandPath, retreat: float | None) -> replies.OpeningReply:
+    straight = np.vstack([np.zeros(len(WRENCH_AXES)), path.deviation])
+    columns = path.tensions, path.wrenches, path.joints, path.engagement, straight
+    return replies.OpeningReply(
+        knots=[
+            replies.OpeningKnot(
+                tensions=tensions, wrench=wrench, joints=joints, engagement=shares, deviation=off
+            )
+            for tensions, wrench, joints, shares, off in zip(
+                *(each.tolist() for each in columns), strict=True
+            )
+        ],
+        events=[replies.TileEventReply(**each._asdict()) for each in path.events],
+        jammed=[replies.JamReply(**each._asdict()) for each in path.jammed],
+        resting=list(path.resting),
+        friction=path.friction,
+        retreat=retreat,
     )
 
 

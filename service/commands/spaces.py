@@ -10,6 +10,7 @@ import msgspec
 from click.core import ParameterSource
 
 import planner
+from hand_models.opening import opening_path
 from service import answering, replies, requests, tables
 from service.commands import options, stances
 
@@ -33,6 +34,9 @@ __all__ = ["body_space_command", "wrench_space_command"]
 @click.option(
     "--robust", is_flag=True, help="And the least of it where the hand is a little elsewhere."
 )
+@click.option(
+    "--opening", is_flag=True, help="And how the hand lets go of its hold; --plot draws this."
+)
 @options.robot_option
 @options.json_option
 def wrench_space_command(
@@ -41,6 +45,7 @@ def wrench_space_command(
     picture: Path | None,
     per_axis: int | None,
     robust: bool,
+    opening: bool,
     robot: planner.RobotFile | None,
     as_json: bool,
 ) -> int:
@@ -54,12 +59,19 @@ def wrench_space_command(
     if robust:
         alone = msgspec.structs.replace(request, want=["robust"])
         reply.robust = answering.answer_wrench_space(alone, robots).robust
+    if opening:
+        alone = msgspec.structs.replace(request, want=["opening"])
+        reply.opening = answering.answer_wrench_space(alone, robots).opening
     found = None
     if per_axis is not None:
         wrist = planner.floating_wrist(answering.stance(request.stance, robots), limb)
         with tables.progress(f"{per_axis}^6 poses of {limb}") as report:
             found = planner.survey(wrist, per_axis, report)
-    if picture is not None:
+    if picture is not None and opening:
+        settled, _ = planner.hand_space(answering.stance(request.stance, robots), limb)
+        with tables.writing(picture):
+            planner.plot_opening(opening_path(settled), picture, f"{limb} of {stance}")
+    elif picture is not None:
         drawn = answering.stance(request.stance, robots)
         settled, space = planner.hand_space(drawn, limb)
         shown, preload = space if reply.capability else None, None
@@ -81,6 +93,8 @@ def wrench_space_command(
         tables.print_wrench_space(reply, tables.console())
         if isinstance(reply.robust, replies.RobustCapability) and reply.capability:
             tables.print_robust(reply.robust, tables.console())
+        if isinstance(reply.opening, replies.OpeningReply):
+            tables.print_opening(reply.opening, tables.console())
         if found is not None:
             tables.print_survey(found, tables.console())
     return tables.ExitStatus.DONE if reply.capability else tables.ExitStatus.OVERLOADED

@@ -5,6 +5,12 @@ from .climb import (
     KnotReply as KnotReply,
 )
 from .diagnosis import DiagnosisReply as DiagnosisReply, SuspectReply as SuspectReply
+from .opening import (
+    JamReply as JamReply,
+    OpeningKnot as OpeningKnot,
+    OpeningReply as OpeningReply,
+    TileEventReply as TileEventReply,
+)
 from .plan import (
     BriefPlanReply as BriefPlanReply,
     CertificateReply as CertificateReply,

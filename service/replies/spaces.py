@@ -5,6 +5,7 @@ from __future__ import annotations
 from msgspec import UNSET, Struct, UnsetType
 
 from planner import Finding, LimitName, Time
+from service.replies.opening import OpeningReply
 from service.replies.reply import Generator, RowReply, SeatingReply, StanceReply, Vector, Wrist
 
 __all__ = [
@@ -208,6 +209,7 @@ class WrenchSpaceReply(StanceReply, kw_only=True):
       it can exert them all, null where it can exert no wrench.
     - ``warnings``: sentences about what was left out.
     - ``robust``: reach over places near the given one; only with ``"want": ["robust"]``.
+    - ``opening``: how the hand lets go of its hold; only with ``"want": ["opening"]``.
     """
 
     robot: str
@@ -227,6 +229,7 @@ class WrenchSpaceReply(StanceReply, kw_only=True):
     cannot: dict[str, str] | None = None
     warnings: list[str] = []
     robust: RobustCapability | UnsetType = UNSET
+    opening: OpeningReply | UnsetType = UNSET
 
 
 class BodyCapability(Struct, kw_only=True):

@@ -64,7 +64,7 @@ Explain = Annotated[
 Axis = Literal["fx", "fy", "fz", "mx", "my", "mz"]
 Direction = tuple[Coordinate, Coordinate, Coordinate]
 PlanWant = Literal[Want, "com_region", "redundancy", "survival"]
-SpaceWant = Literal["robust", "half_spaces", "vertices"]
+SpaceWant = Literal["robust", "half_spaces", "vertices", "opening"]
 Radius = Annotated[
     float,
     Meta(
@@ -224,7 +224,7 @@ class WrenchSpaceRequest(Query, frozen=True, kw_only=True):
             description="results beside rows and capability, each at most once; an error of kind "
             "limit where it would cost too much, as many half_planes may. By default "
             "half_spaces and vertices where they are cheap. robust: the least that it can carry "
-            "over a scatter of its place",
+            "over a scatter of its place. opening: how it lets go, of a fixed wrist",
             extra_json_schema={"uniqueItems": True},
         ),
     ] = None

@@ -31,6 +31,7 @@ from .layout import (
     print_warnings as print_warnings,
     text as text,
 )
+from .openings import print_opening as print_opening
 from .output_lock import write_alone as write_alone
 from .plans import print_plan as print_plan, print_route as print_route
 from .redundancy import print_redundancy as print_redundancy

@@ -1,220 +1,184 @@
 """One finger that opens, simulated step by step: for reading, and to compare with.
 
-The joints move in oil as those of a `PlainFinger` do that closes, while the tension is lowered by
-small increments; the law is that of `hand_models.finger.finger_path`. Where spines let go is found
-here by the force that they bear once the joints are at rest.
+The law is that of `hand_models.finger.finger_path`. Here rock and joint stops are stiff springs,
+the joints move in oil, and the tension is lowered by small increments, at each of which the finger
+comes to rest before its spines are looked at. So no contact is ever switched.
+
+Only where a phalanx is beside the rock, and where and along which direction a contact's force acts
+(`phalanx_beside`), is shared with what is compared.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
 from hand_models.finger import FingerModel, OpenFinger, SettledFinger
-from tests.suite.helpers.plain_closing import (
-    AIR,
-    AT_REST,
-    FREE,
-    HELD,
-    LARGEST,
-    MOST_STEPS,
-    OPEN,
-    ROCK,
-    SHUT,
-    TURN,
-    Beside,
-    LostError,
-    PlainFinger,
-)
+from hand_models.finger.phalanx_shape import PhalanxShape, fan_out
+from hand_models.sections import Outlines
+from hand_models.tile import engaged_share
+from tests.suite.helpers import phalanges
 
-SLIDES = 3
-"""What may become of a phalanx besides: pressed, it is dragged backwards against friction."""
+ROCK = 1e6
+"""Stiffness of rock, and of spines in pull [N/m]."""
 
-NONE = 1e-7
-"""A force that counts as none [N]."""
+STOP = 1e3
+"""Stiffness of joint stops [N·m/rad]."""
 
-HARDLY = 1e-3
-"""A force with which a tile hardly presses [N]."""
+LARGEST = 4e-3
+"""Turn of a joint in a step [rad]."""
+
+AT_REST = 5e-6
+"""Torque that is none, in parts of the tendon's about the proximal joint at closing."""
+
+NEAR = 1e-4
+"""Gap of a tile that lies on the rock, as the closed hand has it [m]."""
+
+SMALLEST = 1e-8
+"""Turn below which torques may grow as they will [rad]."""
+
+GROWN = 2e-3
+"""Growth of a torque in a step, in the same parts."""
+
+MOST_STEPS = 1000
+"""At one tension."""
+
+TURN = 1e-7
+"""For derivatives [rad]."""
 
 
-class PlainOpening(PlainFinger):
+class LostError(Exception):
+    """The finger does not come to rest."""
+
+
+class PlainOpening:
     """A closed finger whose tendon is let go.
 
     Attributes
     ----------
+    q, shears, normals : ndarray, shape (3,)
+        Turns of its joints [rad]; loads of its phalanges on the rock [N].
+    grip : ndarray, shape (3,)
+        Share of each tile's spines that hold.
     let_go : list of (int, float)
         Phalanges whose spines have let go, and at which tension [N].
     """
 
     def __init__(self, model: FingerModel, opened: OpenFinger, closed: SettledFinger) -> None:
-        super().__init__(model, opened)
+        self.model, self.surface, self.closing = model, opened.surface, opened.tension
+        self.shape = PhalanxShape.of(model)
+        reach = model.reach + model.tile_length
+        self.rock = Outlines.of([opened.rock], reach, self.shape.spacing)
         loss = model.losses(opened.base_tile)
+        self.pull, self.drag = loss * model.pulley_radii, loss * model.engagement
         self.gain = loss * model.shear_gain
-        self.q = closed.joint_angles.copy()
-        here = self.beside(self.q)
-        shears = closed.shears(opened.tension, opened.base_tile)
-        normals = closed.normals(shears, opened.base_tile) @ [1.0, opened.tension]
-        self.grip = closed.engagement.copy()
-        self.modes = tuple(
-            AIR if kind == "none" or (gap > 1e-4 and n >= 0.0) else ROCK if n >= 0.0 else HELD
-            for kind, gap, n in zip(
-                (contact.kind for contact in closed.contacts), here.gap, normals, strict=True
-            )
-        )
-        sides = {"upper": SHUT, "lower": OPEN}
-        self.sides = tuple(sides.get(contact.stop, FREE) for contact in closed.contacts)
-        # on the rock a tile is held where the rock is
-        self.least = np.where(here.gap < 1e-4, 0.0, here.gap)
+        self.depth = self.pull * self.closing / (model.tile_centre * model.bed_stiffness)
+        self.size = float(self.pull[0]) * self.closing
+        self.q, self.grip = closed.joint_angles.copy(), closed.engagement.copy()
+        gap, *_ = self.beside(self.q)
+        self.least = np.where(gap < NEAR, 0.0, gap)
+        # a tile beside a joint's stop that bears nothing is drawn in by nothing
+        self.grip[[contact.kind == "none" for contact in closed.contacts]] = 0.0
+        self.shears = self.normals = np.zeros(3)
         self.let_go: list[tuple[int, float]] = []
 
-    def lower_to(self, tension: float) -> None:
-        """Let the finger come to rest at a lower tension."""
-        before = self.grip > 0.0
-        for _ in range(MOST_STEPS):
-            if self.step(tension, 0.0) < AT_REST and not self.released(tension):
-                break
-        else:
-            raise LostError(f"in motion still at {tension:.2f} N")
-        gone = before & (self.grip == 0.0)
-        self.let_go += [(j, tension) for j in gone.nonzero()[0].tolist()]
+    def beside(self, q: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return what is beside the phalanges.
 
-    def laws(self, here: Beside, tension: float) -> np.ndarray:
-        """Return the shear of each tile by its tendon alone [N]."""
-        lowered = self.closing - tension
-        bears = (np.array(self.modes) != AIR) | (np.array(self.sides) == FREE)
-        whole = self.drag * self.closing - self.gain * lowered
-        return np.asarray(np.minimum(here.share, self.grip) * bears * whole)
+        Gaps, shares, arms (3, 3) of unit shears and normal forces about joints; and places of
+        contacts and unit vectors of normal forces, as complex numbers in F.
+        """
+        joints, u = fan_out(q, self.shape.end)
+        within = self.depth + 1e-4
+        near = phalanges.points_near(self.rock, self.shape, joints, u, within)
+        found = phalanges.beside(self.rock, self.shape, joints, u, self.depth, near)
+        share = np.array(list(map(self.on_rock, joints, u, found.tile_gap)))
+        share = engaged_share(1.0 - share * found.push.imag, 1.0)
+        arms = (joints + found.place * u)[None, :] - joints[:, None]
+        arms = np.triu(arms * (found.push / 1j * u).conj()[None, :])
+        return found.gap, share, -arms.imag, -arms.real, joints + found.place * u, found.push * u
 
-    def loads(self, tension: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return shears and normal loads [N], and the places and axes of the contacts in F."""
-        here = self.beside(self.q)
-        slides = np.array(self.modes) == SLIDES
-        law = self.laws(here, tension)
-        return np.where(slides, -self.surface.friction * self.normals, law), self.normals, self.q
+    def on_rock(self, joint: complex, u: complex, tile_gap: float) -> float:
+        """Return the share of a tile's spines that reach the rock: the mean over its strips."""
+        s, behind = self.shape, self.rock.behind[0]
+        seen = (self.rock.places[0] - joint) * u.conjugate()
+        away = np.abs(seen - seen.real.clip(s.near, s.far) - 1j * s.lift)
+        near = away - away.min(initial=math.inf) + tile_gap < s.travel
+        farther = np.zeros(1)
+        if behind.shape[1] > 1 and near.any():
+            farther = (away[near, None] + behind[near]).min(axis=0) - away.min()
+        return float(np.mean(engaged_share(tile_gap + farther, s.travel, s.exponent)))
 
-    def released(self, tension: float) -> bool:
-        """Let the spines go that bear too much, the worst first; return whether any did."""
-        here = self.beside(self.q)
-        law, pull = self.laws(here, tension), -self.normals
-        pressed = np.isin(self.modes, (ROCK, SLIDES)) & (self.normals > NONE)
-        beyond = np.where(pressed, 0.0, self.surface.friction * pull.clip(0.0) - law)
-        strength = [
-            math.hypot(t, p) - share * self.surface.strength(math.atan2(p, t))
-            if p > NONE and share > 0.0
-            else 0.0
-            for t, p, share in zip(law, pull, np.minimum(here.share, self.grip), strict=True)
-        ]
-        beyond = np.where(self.grip > 0.0, np.maximum(beyond, strength), 0.0)
-        worst = int(beyond.argmax())
-        if beyond[worst] <= NONE:
-            return False
-        self.grip[worst] = 0.0
-        if self.modes[worst] in (HELD, SLIDES):
-            modes = list(self.modes)
-            modes[worst] = AIR
-            self.modes = tuple(modes)
-        return True
+    def contacts(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return places (x, z) of contacts in F [m], and forces on the rock there [N], (3, 2)."""
+        forces = (self.normals + 1j * self.shears) * self.pushes
+        places, forces = (np.column_stack([each.real, each.imag]) for each in (self.places, forces))
+        return places, forces
 
-    def step(self, tension: float, late: float) -> float:
-        """Move for a while; return by how much the joints turned, had it been long [rad]."""
-        self.steps += 1
-        self.back_to_the_rock()
-        here = self.beside(self.q)
-        # nothing is caught anew
-        self.grip = np.minimum(self.grip, here.share)
-        # a tile that slides and is hardly pressed lets go
-        gone = (np.array(self.modes) == SLIDES) & (self.normals < HARDLY)
-        self.grip[gone] = 0.0
-        self.modes = tuple(np.where(gone, AIR, self.modes).tolist())
-        # dragged backwards, spines hold nothing that is not pressed
-        within = (self.grip > 0.0) & (self.laws(here, tension) >= -NONE)
-        held = np.array(self.modes) == HELD
-        self.modes = tuple(np.where(held & ~within, AIR, self.modes).tolist())
-        turned = [self.beside(self.q + TURN * e) for e in np.eye(3)]
-        d_gap = np.column_stack([(each.gap - here.gap) / TURN for each in turned])
-        size, mu = self.pull[0] * self.closing, self.surface.friction
-        damping = 0.0
-        while damping < 1e6 * size:
-            for modes, sides in self.ways(here, within):
-                slides = np.array(modes) == SLIDES
-
-                def whole(
-                    beside: Beside, q: np.ndarray, slides: np.ndarray = slides
-                ) -> tuple[np.ndarray, np.ndarray]:
-                    law = np.where(slides, 0.0, self.laws(beside, tension))
-                    torque = tension * self.pull - self.preload - self.stiffness * q
-                    arms = beside.across - mu * slides * beside.along
-                    return torque + beside.along @ law, arms
-
-                torque, arms = whole(here, self.q)
-                stiff = np.column_stack(
-                    [
-                        (torque + arms @ self.normals - there - their @ self.normals) / TURN
-                        for there, their in (
-                            whole(each, self.q + TURN * e)
-                            for each, e in zip(turned, np.eye(3), strict=True)
-                        )
-                    ]
-                )
-                if damping == 0.0:
-                    softest = float(np.linalg.eigvalsh(0.5 * (stiff + stiff.T))[0])
-                    oil = max(0.0, -2.0 * softest)
-                else:
-                    oil = damping
-                plain = tuple(ROCK if mode == SLIDES else mode for mode in modes)
-                there = here._replace(across=arms)
-                found = self.moved(there, d_gap, stiff, oil, torque, plain, sides, within)
-                if found is not None and self.drags(here, found[1], modes, tension):
-                    break
-            else:
-                damping = max(4.0 * damping, 0.05 * size)
-                continue
-            turn, normals = found
-            if np.abs(turn).max() <= LARGEST:
-                break
-            damping = max(2.0 * damping, 0.05 * size)
-        else:
-            raise LostError("no step")
-        changed = modes != self.modes or sides != self.sides
-        self.q = np.clip(self.q + turn, self.lower, self.upper)
-        self.modes, self.sides, self.normals = modes, sides, normals
-        return LARGEST if changed else float(np.abs(turn).max() * (1.0 + oil / 0.05))
-
-    def drags(
-        self, here: Beside, normals: np.ndarray, modes: tuple[int, ...], tension: float
-    ) -> bool:
-        """Return whether pressed tiles slide just where the tendon drags less than friction."""
-        law, mu = self.laws(here, tension), self.surface.friction
-        for mode, t, n in zip(modes, law, normals, strict=True):
-            if mode == ROCK and t + mu * n < -NONE:
-                return False
-            if mode == SLIDES and t + mu * n > NONE:
-                return False
-        return True
-
-    def ways(self, here: Beside, within: np.ndarray) -> Iterator[tuple[tuple[int, ...], ...]]:
-        """What may become of phalanges and joints; first what differs least from what was."""
-        phalanges = [
-            [AIR]
-            + [ROCK] * bool(gap < 3e-3)
-            + [SLIDES] * bool(gap < 3e-3 and grip > 0.0)
-            + [HELD] * bool(holds)
-            for gap, holds, grip in zip(here.gap, within, self.grip, strict=True)
-        ]
-        near = 2.0 * LARGEST
-        joints = [
-            [FREE] + [OPEN] * bool(q < low + near) + [SHUT] * bool(q > high - near)
-            for q, low, high in zip(self.q, self.lower, self.upper, strict=True)
-        ]
-        now = (*self.modes, *self.sides)
-        others = sorted(
-            itertools.product(*phalanges, *joints),
-            key=lambda way: sum(a != b for a, b in zip(way, now, strict=True)),
+    def torque(self, q: np.ndarray, tension: float) -> np.ndarray:
+        """Return the torque on each joint, and note the loads."""
+        gap, share, along, across, self.places, self.pushes = self.beside(q)
+        law = self.drag * self.closing - self.gain * (self.closing - tension)
+        held = np.minimum(share, self.grip)
+        law, held = held * law, (held > 0.0) & (law >= 0.0)
+        pull = np.where(held, (gap - self.least).clip(0.0), 0.0)
+        self.normals = ROCK * ((-gap).clip(0.0) - pull)
+        friction = self.surface.friction * self.normals.clip(0.0)
+        self.law, self.share, self.shears = law, share, np.maximum(law, -friction)
+        m = self.model
+        stops = (q - m.joint_upper).clip(0.0) + (q - m.joint_lower).clip(None, 0.0)
+        springs = np.array(m.joint_preload) + np.array(m.joint_stiffness) * q + STOP * stops
+        return np.asarray(
+            tension * self.pull - springs + along @ self.shears + across @ self.normals
         )
-        for way in others:
-            modes, sides = way[:3], way[3:]
-            if sum(m != AIR for m in modes) + sum(s != FREE for s in sides) <= 3:
-                yield modes, sides
+
+    def lower_to(self, tension: float) -> None:
+        """Let the finger come to rest at a lower tension, and its spines go that bear too much."""
+        while True:
+            self.come_to_rest(tension)
+            # nothing is caught anew
+            out = (self.grip > 0.0) & (self.share == 0.0)
+            self.let_go += [(j, tension) for j in out.nonzero()[0].tolist()]
+            self.grip = np.minimum(self.grip, self.share)
+            beyond = np.where(self.grip > 0.0, self.overloads(), 0.0)
+            worst = int(beyond.argmax())
+            if beyond[worst] <= 1e-6:
+                break
+            self.grip[worst] = 0.0
+            self.let_go.append((worst, tension))
+
+    def overloads(self) -> np.ndarray:
+        """Return by how much the spines of each tile bear too much; they do not where pressed."""
+        pull, s = (-self.normals).clip(0.0), self.surface
+        over = np.where(self.normals > 0.0, 0.0, s.friction * pull - self.law)
+        for j in (pull > 0.0).nonzero()[0].tolist():
+            strength = self.grip[j] * s.strength(math.atan2(pull[j], self.law[j]))
+            over[j] = max(over[j], math.hypot(self.law[j], pull[j]) - strength)
+        return np.asarray(over)
+
+    def come_to_rest(self, tension: float) -> None:
+        """Let the joints move: steps of implicit Euler, shorter where torques grow."""
+        oil, here = 0.02 * self.size, self.torque(self.q, tension)
+        for _ in range(MOST_STEPS):
+            left = float(np.abs(here).max())
+            if left < AT_REST * self.size:
+                return
+            stiff = np.column_stack(
+                [(here - self.torque(self.q + TURN * e, tension)) / TURN for e in np.eye(3)]
+            )
+            # what is unstable grows by a part within a step
+            unstable = -2.0 * float(np.linalg.eigvals(stiff).real.min())
+            oil = max(oil, min(unstable, self.size))
+            while True:
+                turn = np.linalg.solve(stiff + oil * np.eye(3), here)
+                size = float(np.abs(turn).max())
+                there = self.torque(self.q + turn, tension)
+                grown = float(np.abs(there).max()) - left
+                if size < LARGEST and (grown < 0.1 * left or grown < GROWN * self.size):
+                    break
+                if size < SMALLEST:
+                    break
+                oil *= 4.0
+            self.q, here, oil = self.q + turn, there, max(0.4 * oil, 1e-6)
+        raise LostError(f"in motion still at {tension:.2f} N")
