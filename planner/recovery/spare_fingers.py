@@ -1,4 +1,4 @@
-"""Whether a plan could do without some fingers, from its multipliers, without another program.
+"""Prove by its multipliers that a plan cannot do without some fingers, without another program.
 
 With u* the least utilisation, λ, μ and ν the multipliers of limits, hard rows and balance, and v
 the fingers' part of the dual objective, every plan without the fingers has
