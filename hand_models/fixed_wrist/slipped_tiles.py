@@ -114,10 +114,11 @@ def _dragging(
     lost : collection of int
     """
     friction, loads = hand.surface.friction, hand.loads[own].copy()
-    slipped = np.isin(own, list(lost))
-    on = np.flatnonzero([hand.tiles[t].phalanx in PHALANGES for t in own])
+    slipped = np.array([t in lost for t in own.tolist()])
+    pressed = np.array([hand.tiles[t].phalanx in PHALANGES for t in own.tolist()])
     # a tile on the rotating base is pressed by no joint
-    loads[np.setdiff1d(np.flatnonzero(slipped), on)] = 0.0
+    loads[slipped & ~pressed] = 0.0
+    on = np.flatnonzero(pressed)
     normals, shears = _moments(hand, finger, own[on])
     before = normals @ loads[on, 1] + shears @ loads[on, 0]
     drags, bears = slipped[on], hand.postures.kinds[finger] != CONTACT_KINDS.index("none")

@@ -173,8 +173,8 @@ def limit_rows(
     shears = _of_fingers(layout, loads[:, :, 0])[:, engaged].transpose(2, 0, 1)
     twisted = np.repeat(np.array([i for i, _ in layout.twisted], dtype=np.intp), len(signs))
     twists = twist_moments(hands, layout.twisted).repeat(len(signs), axis=2)
-    twists *= np.resize(signs, len(twisted))
-    either_way = np.array([np.zeros(len(sideways)), np.resize(signs, len(sideways))])
+    twists *= signs * len(layout.twisted)
+    either_way = np.array([(0.0,) * len(sideways), signs * len(layout.reacting)])
     for of, (start, slope), end in (
         (engaged, shears, structure.finger_shear),
         (sideways, either_way, np.array([_aside(hand)[reacting] for hand in hands])),
@@ -192,7 +192,7 @@ def limit_rows(
                 l0[h, i], s[h, i] = limit.a_normal * t0, limit.capacity
         k += 2
     if layout.palm:
-        L[:, k : k + 2, -2:] = [np.eye(2) * bool(hand.palm.engaged) for hand in hands]
+        L[:, [k, k + 1], [-2, -1]] = [[bool(hand.palm.engaged)] for hand in hands]
         s[:, k : k + 2] = [(hand.palm.shear_limit, hand.palm.pressing_limit) for hand in hands]
         k += 2
     L[:, k:], l0[:, k:], s[:, k:] = V[:, 6:], at_zero[:, 6:], structure.hand_load

@@ -173,7 +173,8 @@ def _too_slack(
         closes[i, finger] = len(phalanges) == len(PHALANGES) and not placements[i].grasp.fingernail
         if closes[i, finger]:
             angles[i, finger] = [each.angle for each in phalanges]
-    turns = np.diff(angles, axis=2, prepend=0.0)
+    turns = angles.copy()
+    turns[..., 1:] -= angles[..., :-1]
     needed = np.where(closes[..., None], resting_tensions(hand.finger, turns, hand.losses), 0.0)
     short = (needed.reshape(len(needed), -1).max(axis=1) > tensions).nonzero()[0].tolist()
     for i in short:

@@ -125,6 +125,9 @@ class Surface:
             f"be at most {most:g} times {limit}",
             ": spines hold less sideways",
         )
+        most = _bound("scatter_ratio")
+        within = self.shear_scatter <= most * self.shear_limit
+        check("shear_scatter", within, f"be at most {most:g} times {limit}")
         for name, why in (
             ("compression_gain", "newtons of shear strength for each newton of pressing"),
             ("friction", "newtons of drag for each newton of pull-off"),

@@ -237,6 +237,8 @@ class HandBatch:
         points = np.concatenate([*positions, [hand.palm.centre for hand in hands]])
         axes = concatenated([hand.axes for hand in hands])
         engagement = concatenated([hand.engagement for hand in hands])
+        bends = angles.copy()
+        bends[:, 1:] -= angles[:, :-1]
         # plans show them
         points.setflags(write=False)
         axes.setflags(write=False)
@@ -250,7 +252,7 @@ class HandBatch:
             engagement,
             concatenated([hand.lateral_shares for hand in hands]),
             angles,
-            np.diff(angles, axis=1, prepend=0.0),
+            bends,
             np.array(limits),
         )
 

@@ -84,8 +84,9 @@ class PreparedStance:
 
     def turned(self, wrench: Array) -> PreparedStance:
         """Return the same stance for another body wrench, shape (6,) [N, N·m], in B."""
-        question = replace(self.question, body_wrench=wrench)
-        return replace(self, question=question, hands=self.hands.turned(wrench), wrench=wrench)
+        question = self.question.turned(wrench)
+        wrench = question.needed_wrench()
+        return PreparedStance(question, self.where, self.batch, self.hands.turned(wrench), wrench)
 
     def with_hands(self, settled: Sequence[SettledHand]) -> PreparedStance:
         """Return the same stance with other settled hands; body, joints and constraints stay.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Final, Protocol, get_args
 
@@ -285,6 +286,18 @@ class Question:
         least: Objective = "max_margin"
         plain = replace(self, want=frozenset(), draws=None, open_loop=None)
         return replace(plain, deadline=None, objective=least, tolerance=None)
+
+    def turned(self, wrench: Array) -> Question:
+        """Return the question for another body wrench, shape (6,) [N, N·m]; the rest is checked.
+
+        Raises
+        ------
+        InvalidInputError
+            If the wrench is not six finite numbers, or too large to be plausible.
+        """
+        question, given = copy(self), finite_vector(wrench, 6, "body_wrench")
+        object.__setattr__(question, "body_wrench", checked_body_wrench(given, "body_wrench"))
+        return question
 
     def needed_wrench(self, weights: Weights | None = None) -> Array:
         """Return the body wrench: what the rock must exert on the robot, in B, shape (6,) [N, N·m].

@@ -7,7 +7,6 @@ program, or two, of the solver that the stance has already, and the check of the
 
 from __future__ import annotations
 
-import math
 import time
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -22,8 +21,9 @@ from hand_models.fixed_wrist import slipped_hand, wrench_spaces
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandBatch, PreparedStance
-from planner.programs import Columns, ScaledRows, StanceData, unique, unique_bound
+from planner.programs import Columns, ScaledRows, StanceData
 from planner.question import LostTile
+from planner.recovery.spare_fingers import cannot_spare
 from planner.recovery.superposition import superposed
 from planner.result import Plan
 from planner.solving import Checks, FixedSolution, StanceAnswer, Verified, answer_on, idle_joints
@@ -100,7 +100,8 @@ class Recovery:
     A tile that has slipped drags on with friction, and only while it is pressed; a finger of which
     no tile holds, or whose slipped tiles cannot all be pressed, is released: off the rock. Where
     the plan is beyond the cap, fingers that have lost more than one tile are released for a second
-    plan, and the better one counts; where there is no plan, all that have lost a tile.
+    plan, unless that is proven to be worse, and the better one counts; where there is no plan, all
+    that have lost a tile.
 
     Parameters
     ----------
@@ -108,8 +109,7 @@ class Recovery:
         The stance before tiles slipped; all wrists are fixed.
     many : bool, optional
         True for very many losses of several tiles: hands without one tile are not worked out
-        ahead, more hands are kept, that there is no plan is not proven, and a second plan is left
-        out where a bound proves that it is worse. Plans are the same.
+        ahead, more hands are kept, and that there is no plan is not proven. Plans are the same.
 
     Raises
     ------
@@ -189,11 +189,9 @@ class Recovery:
         more = {finger for finger, count in counts.items() if count >= least} - {*first.released}
         if first.holds or not more:
             return first
-        if self._many and first.verified is not None:
-            # mostly the other fingers cannot do without these
-            keys = self._keys(by_hand, gone | more, off)
-            if self._bound(keys, body_wrench) > first.utilisation:
-                return first
+        # mostly the other fingers cannot do without these
+        if first.verified is not None and cannot_spare(self.prepared, first.found, more):
+            return first
         second = self._answer(start, lost, by_hand, gone | more, off, body_wrench)
         return second if second.utilisation < first.utilisation else first
 
@@ -246,12 +244,6 @@ class Recovery:
     ) -> PreparedStance:
         prepared = self._stances.get(keys, lambda: self._prepared(keys))
         return prepared if body_wrench is None else prepared.turned(body_wrench)
-
-    def _bound(self, keys: tuple[_HandKey, ...], body_wrench: Array | None) -> float:
-        """Return a lower bound of the least utilisation; −∞ without one."""
-        data = self._stance_without(keys, body_wrench).at_rest.data
-        outcome = unique(data)
-        return unique_bound(data, outcome) if outcome.solved else -math.inf
 
     def _nearest(self, keys: tuple[_HandKey, ...]) -> FixedSolution | None:
         """Return a solution to start from: of the same losses, or superposed from single ones."""

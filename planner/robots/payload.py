@@ -86,9 +86,12 @@ def held_up(mass: float, place: Array, linear: Array, angular: Array) -> Array:
     """
     import numpy as np
 
-    with np.errstate(over="ignore", invalid="ignore"):
-        force = mass * (linear + np.cross(angular, place))
-        return np.concatenate([force, np.cross(place, force)])
+    # by numbers: NumPy's cross product takes twenty times as long, and warns of infinite ones
+    (x, y, z), (a, b, c), (p, q, r) = place.tolist(), linear.tolist(), angular.tolist()
+    f = mass * (a + q * z - r * y)
+    g = mass * (b + r * x - p * z)
+    h = mass * (c + p * y - q * x)
+    return np.array([f, g, h, y * h - z * g, z * f - x * h, x * g - y * f])
 
 
 def check_carrier(robot: Robot, payload: Payload) -> None:

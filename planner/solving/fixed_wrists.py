@@ -142,7 +142,7 @@ class FixedSolution(Solution):
 
 
 def fixed_solutions(
-    prepared: PreparedStance, near: Solution | None = None
+    prepared: PreparedStance, near: Solution | None = None, *, twice: bool = True
 ) -> Iterator[FixedSolution]:
     """Yield candidates for the plan of least utilisation, from one method after the other.
 
@@ -152,10 +152,13 @@ def fixed_solutions(
         The question's stance, with hands on their holds and their sets.
     near : Solution, optional
         Solution for the same hands at another body wrench, as a warm start.
+    twice : bool, optional
+        As of `least_utilisation`.
     """
     sets, cap = prepared.at_rest, prepared.question.limits.utilisation
     before = near.start if isinstance(near, FixedSolution) else None
-    found = least_utilisation(sets.data, cap, prepared.batch.closing_tensions, before)
+    closing = prepared.batch.closing_tensions
+    found = least_utilisation(sets.data, cap, closing, before, twice=twice)
     late: tuple[Unfinished, ...] = ()
     if found.proven:
         loads = () if found.meant is None else found.meant.loads

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, finite_vector
+from hand_models.base import Array
 from planner import deadline, programs
 from planner.advice import StanceTrial, advise
 from planner.deadline import Budget, late_sentence
@@ -17,7 +17,7 @@ from planner.explanation import LimitUse, certify
 from planner.floating import SETTINGS
 from planner.prepare import PreparedStance, checked_question, prepare_stance
 from planner.programs import CAP_SLACK, LOAD_BOX, LOAD_UNIT
-from planner.question import Question, checked_body_wrench
+from planner.question import Question
 from planner.result import LoadFactor, Plan, Time
 from planner.solving.explained import explained_plan, reason_beyond, unexplained
 from planner.solving.fixed_wrists import FixedSolution, fixed_solutions, nearest_solutions
@@ -140,7 +140,8 @@ def answer_on(
     near : Solution, optional
         Solution for the same hands at another body wrench, as a warm start.
     prove : bool, optional
-        False to leave out the proof where nothing has passed the checks.
+        False to leave out the proof where nothing has passed the checks, and the solver's own
+        multipliers at utilisations far above one.
 
     Raises
     ------
@@ -152,7 +153,8 @@ def answer_on(
     checks = prepare_checks(prepared) if known is None else known
     answer: Answer | None = _next_verified(prepared, checks, budget, near)
     if answer is None:
-        answer = _first_verified(prepared, checks, _solutions(prepared, budget, near))
+        found = _solutions(prepared, budget, near, twice=prove)
+        answer = _first_verified(prepared, checks, found)
     if isinstance(answer, Failed) or _beyond_all_loads(prepared, answer):
         proven = prove or not isinstance(answer, Failed)
         answer = _second_look(prepared, checks, answer, budget, prove=proven)
@@ -162,12 +164,12 @@ def answer_on(
 
 
 def _solutions(
-    prepared: PreparedStance, budget: Budget, near: Solution | None = None
+    prepared: PreparedStance, budget: Budget, near: Solution | None = None, *, twice: bool = True
 ) -> Iterator[Solution]:
     """Yield the plan that a question asks for, in one way after the other."""
     if prepared.hands.floating:
         return _best_in(prepared, [floating_solution(prepared, budget, near)], budget)
-    return _best_in(prepared, fixed_solutions(prepared, near), budget)
+    return _best_in(prepared, fixed_solutions(prepared, near, twice=twice), budget)
 
 
 def _best_in(
@@ -350,8 +352,7 @@ class KnownStance:
         start : float
             Time at which the answer was begun, on the clock of `time.perf_counter` [s].
         """
-        wrench = checked_body_wrench(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
-        near, prepared = self._near, self.prepared.turned(wrench)
+        near, prepared = self._near, self.prepared.turned(body_wrench)
         found = answer_on(prepared, start, self._checks, near)
         if isinstance(near, FloatingSolution) and not found.optimal:
             # the search from the wrists of another wrench is local

@@ -75,6 +75,8 @@ def least_utilisation(
     cap: float,
     closing: Sequence[float],
     near: LeastUtilisation | None = None,
+    *,
+    twice: bool = True,
 ) -> LeastUtilisation:
     """Solve for the least utilisation, and for the plan to report, which has less tension.
 
@@ -93,6 +95,9 @@ def least_utilisation(
     near : LeastUtilisation, optional
         Result for the same hands at another body wrench. If the same rows are active at the
         optimum, no solver is called.
+    twice : bool, optional
+        False to look for the exact plan at a smaller weight near the first solution, before the
+        program is solved again.
     """
     if near is not None:
         exact = active_set_optimum(data, near.outcome, rounds=1)
@@ -101,6 +106,9 @@ def least_utilisation(
     outcome, share = programs.unique(data), 1.0
     if outcome.solved and _far_beyond(outcome):
         smaller = outcome.value**-2
+        exact = None if twice else active_set_optimum(data, outcome, smaller)
+        if exact is not None:
+            return _meant(data, exact, cap, closing)
         again = programs.unique(data, smaller)
         if again.solved:
             outcome, share = again, smaller

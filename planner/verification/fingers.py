@@ -14,6 +14,7 @@ from hand_models.base import BASE_TOLERANCES, Array, Indices
 from hand_models.hand import FINGERS, NAIL
 from planner.prepare import CONTACT_CODES, HandBatch
 from planner.result import PlanArrays
+from planner.verification.joint_balance import frame_axes, wrenches_of
 from planner.verification.residuals import (
     FINGER_COUNT,
     PartNames,
@@ -133,11 +134,8 @@ class TwistLimits(ResidualLimits):
     """
 
     def __init__(self, known: HandBatch) -> None:
-        frames = [f for hand in known.hands for f in hand.hand.frames(hand.grasp.outer_rotation)]
-        joints, along, across = (
-            np.array([getattr(frame, name) for frame in frames])
-            for name in ("joint", "along", "across")
-        )
+        along, _, joints = frame_axes(known).swapaxes(0, 1)
+        across = np.array([-1.0, 1.0, 0.0]) * along[:, [1, 0, 2]]
         arms = known.points[known.places.phalanges] - joints[:, None]
         beside = np.abs((arms * across[:, None]).sum(axis=2)).max(axis=1)
         self._fingers = own = np.flatnonzero(beside > BASE_TOLERANCES.length)
@@ -156,7 +154,8 @@ class TwistLimits(ResidualLimits):
             return []
         tiles, planned = self._tiles, again.arrays
         in_plane = again.loads[tiles][..., :2, None] * planned.axes[tiles][..., :2, :]
-        moments = np.cross(planned.points[tiles] - self._joints, in_plane.sum(axis=2))
+        arms, forces = planned.points[tiles] - self._joints, np.add.reduce(in_plane, axis=2)
+        moments = wrenches_of(arms.reshape(-1, 3), forces.reshape(-1, 3))[:, 3:].reshape(arms.shape)
         beyond = np.cumsum(moments[:, ::-1], axis=1)[:, ::-1]
         used = (beyond * self._axes).sum(axis=2) / self._most
         return [Residual("use", np.hstack([used, -used]), self._fingers // FINGER_COUNT)]

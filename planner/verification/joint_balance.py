@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from hand_models.base import SKEW_MATRICES, Array
 from hand_models.finger import JOINT_STOPS, PHALANGES
 from hand_models.hand import HandModel
-from planner.prepare import CONTACT_CODES, TileIndex
+from planner.prepare import CONTACT_CODES, HandBatch, TileIndex
 from planner.verification.residuals import (
     FINGER_COUNT,
     PartNames,
@@ -38,7 +38,7 @@ from planner.verification.residuals import (
     ResidualLimits,
 )
 
-__all__ = ["Fingers", "JointBalance", "tendons_of", "wrenches_of"]
+__all__ = ["Fingers", "JointBalance", "frame_axes", "tendons_of", "wrenches_of"]
 
 TURNED_PHALANGES: Final = np.tri(len(PHALANGES)).T
 """Ones where a joint (row) turns a phalanx (column)."""
@@ -96,6 +96,12 @@ def tendons_of(places: TileIndex, hand: HandModel) -> tuple[Array, Array, Array,
     engaged[places.phalanges] = local * np.array(model.engagement)
     engaged[places.bases] = model.base_engagement
     return local * model.pulley_radii, left, gain, engaged - gain
+
+
+def frame_axes(known: HandBatch) -> Array:
+    """Return along, inward and the place of the proximal joint of each finger, (F, 3, 3), in H."""
+    turns = tuple([hand.grasp.outer_rotation for hand in known.hands])
+    return known.hands[0].hand.frame_stack(turns).planes.reshape(-1, 3, 3)
 
 
 class Fingers(NamedTuple):
@@ -158,15 +164,15 @@ class JointBalance(ResidualLimits):
         self._gain = gain * known.engagement
         self._rest = known.bends * -np.array(body.finger.joint_stiffness)
         self._rest -= body.finger.joint_preload
-        frames = [frame for hand in hands for frame in body.frames(hand.grasp.outer_rotation)]
-        along = np.array([frame.along for frame in frames])
+        along, _, joints = frame_axes(known).swapaxes(0, 1)
         across = along[:, [1, 0, 2]] * [-1.0, 1.0, 0.0]
         # the proximal joints' axes as rows for wrenches; what is added per metre along and inward
-        turning = wrenches_of(np.array([frame.joint for frame in frames]), -across)
-        self._first_axes = np.roll(turning, 3, axis=1)[:, None]
-        self._turns = np.zeros((len(frames), 2, 6))
+        self._first_axes = wrenches_of(joints, -across)[:, None, [3, 4, 5, 0, 1, 2]]
+        self._turns = np.zeros((len(along), 2, 6))
         self._turns[:, 0, 2], self._turns[:, 1, :3] = -1.0, along
-        directions = np.stack((np.cos(known.angles), np.sin(known.angles)), axis=2)
+        directions = np.empty((*known.angles.shape, 2))
+        np.cos(known.angles, out=directions[..., 0])
+        np.sin(known.angles, out=directions[..., 1])
         # ones where a phalanx (column) is before a joint (row)
         self._joints = body.finger.joint_spacing * np.tri(len(PHALANGES), k=-1) @ directions
         # friction holds the tendon of a finger that draws a tile or a nail along rock

@@ -54,9 +54,8 @@ class LimitCurves:
         of_each = np.array(numbers).T.take(of_tile, 1)
         of_each[[0, 2]] *= shares
         # f_s, and 1 − λ: at φ = 0, and what they lose up to φ_max; −1 / φ_max; γ; p
-        self._flat, self._loss, (self._per_radian, self._gain, self._exponent) = np.split(
-            of_each, [2, 4]
-        )
+        self._flat, self._loss = of_each[:2], of_each[2:4]
+        self._per_radian, self._gain, self._exponent = of_each[4:]
 
     def excess(self, shear: Array, normal: Array, lateral: Array, relative: float) -> Array:
         """Return by how much loads exceed their tiles' strength [N]; negative inside the limit.

@@ -392,6 +392,7 @@ def test_own_values_follow_from_shear_alone_by_the_default_ratios():
         ({"shear_limit": 60.0, "compression_gain": -0.1}, "compression_gain"),
         ({"shear_limit": 60.0, "compression_gain": math.nan}, "compression_gain"),
         ({"shear_limit": 60.0, "shear_scatter": -1.0}, "shear_scatter"),
+        ({"shear_limit": 60.0, "shear_scatter": 6001.0}, "shear_scatter"),
         ({"shear_limit": 60.0, "lateral_pull_off_ratio": 0.0}, "lateral_pull_off_ratio"),
         ({"shear_limit": 60.0, "lateral_pull_off_ratio": 1.1}, "lateral_pull_off_ratio"),
         ({"shear_limit": 60.0, "pull_off_exponent": 0.0}, "pull_off_exponent"),

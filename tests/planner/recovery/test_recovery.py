@@ -14,6 +14,7 @@ from planner.programs.conic import WAITING_SOLVERS
 from planner.programs.program import Best
 from planner.question import LostTile
 from planner.recovery import Recovery
+from planner.recovery.spare_fingers import cannot_spare
 from planner.verification import Check
 from service.answering.questions import question
 from service.commands.stances import read_request
@@ -290,3 +291,21 @@ def test_plans_for_very_many_losses_are_the_same(recoveries, name):
             near = 1e-4 * float(np.abs(loads).max())
             np.testing.assert_allclose(found.verified.arrays.loads, loads, atol=near)
     assert released > 0
+
+
+@pytest.mark.parametrize("name", ["wall-300", "slab", "boulders"])
+def test_fingers_that_cannot_be_spared_make_plans_worse(recoveries, name):
+    """Beside plans without these fingers, and in loads that hands can hardly bear."""
+    recovery, chance = recoveries[name], np.random.default_rng(8)
+    proven = harder = 0
+    for _ in range(12):
+        wrench = recovery.prepared.wrench * chance.uniform(0.8, 1.5)
+        lost = [recovery.tiles[i] for i in chance.choice(len(recovery.tiles), 2, replace=False)]
+        found = recovery.plan(lost, wrench)
+        fingers = {(tile.limb, tile.finger) for tile in lost} - {*found.released}
+        without = recovery.plan(lost, wrench, released=fingers)
+        harder += without.utilisation > found.utilisation * 1.001
+        if cannot_spare(recovery.prepared, found.found, fingers):
+            proven += 1
+            assert without.utilisation > found.utilisation
+    assert harder / 2 < proven <= harder
