@@ -123,6 +123,7 @@ from .route import (
     evaluate as evaluate,
     find_route_survival as find_route_survival,
 )
+from .screening import Screened as Screened, screen as screen
 from .simulation import find_survival as find_survival
 from .solving import (
     KnownStance as KnownStance,
