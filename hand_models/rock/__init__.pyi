@@ -17,6 +17,7 @@ from .profile import Profile as Profile
 from .smoothing import load_compiled as load_compiled
 from .surface import Triangles as Triangles, drawn_out as drawn_out, grid as grid
 from .triangles import (
+    TriangleCells as TriangleCells,
     connected as connected,
     edges_of as edges_of,
     grouped as grouped,

@@ -1,4 +1,4 @@
-"""Find the triangles of a mesh in a box or on a line, by a tree of boxes (compiled).
+"""Find the triangles of a mesh in a box, on a line or near a point, by a tree of boxes (compiled).
 
 Triangles in the order of a space-filling curve make up leaves of equally many. Each box of a level
 holds two of the level below it, so that a search visits those boxes alone that it meets, however
@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, compiled
 
-__all__ = ["curve_places", "leaf_boxes", "lines_met", "solid_triangles", "triangles_in_box"]
+__all__ = [
+    "curve_places",
+    "distances_from",
+    "leaf_boxes",
+    "lines_met",
+    "solid_triangles",
+    "triangles_in_box",
+]
 
 LEAF_SIZE: Final = 8
 """Triangles in a leaf; what is found does not depend on it."""
@@ -229,3 +236,118 @@ def lines_met(
                     ahead = min(ahead, where)
         entries[line] = behind if inside else ahead
     return entries, sides
+
+
+@compiled()
+def _box_square(box: Array, p: Array) -> float:
+    """Return the squared distance of a point from a box; zero inside."""
+    total = 0.0
+    for k in range(3):
+        away = max(box[0, k] - p[k], p[k] - box[1, k], 0.0)
+        total += away * away
+    return total
+
+
+@compiled()
+def _dot(a: Array, b: Array) -> float:
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@compiled()
+def _on_triangle(d: tuple[float, ...]) -> tuple[float, float]:
+    """Return how far along its edges ab and ac the point of a triangle nearest to p is.
+
+    Ericson, *Real-Time Collision Detection* (2005), section 5.1.5. ``d``: the products of ab and of
+    ac with p − a, p − b and p − c.
+    """
+    d1, d2, d3, d4, d5, d6 = d
+    if d1 <= 0.0 and d2 <= 0.0:
+        return 0.0, 0.0
+    if d3 >= 0.0 and d4 <= d3:
+        return 1.0, 0.0
+    if d6 >= 0.0 and d5 <= d6:
+        return 0.0, 1.0
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        return d1 / (d1 - d3), 0.0
+    if vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        return 0.0, d2 / (d2 - d6)
+    if va <= 0.0 and d4 >= d3 and d5 >= d6:
+        w = (d4 - d3) / (d4 - d3 + d5 - d6)
+        return 1.0 - w, w
+    return vb / (va + vb + vc), vc / (va + vb + vc)
+
+
+@compiled("f2", "i2", "i1", "f3", "i1", "f2", "f0")
+def distances_from(
+    vertices: Array,
+    faces: Indices,
+    order: Indices,
+    boxes: Array,
+    levels: Indices,
+    points: Array,
+    most: float,
+) -> Array:
+    """Return the distance of points (n, 3) from a mesh, shape (n,) [m]; negative behind it.
+
+    Where an edge or a corner is nearest, the side is that of the triangle which faces the point the
+    most.
+
+    Parameters
+    ----------
+    vertices, faces, order, boxes, levels
+        The mesh and its tree, as of `triangles_in_box`.
+    points : ndarray, shape (n, 3)
+        Where it is measured from [m].
+    most : float
+        Distance up to which it is measured [m]; farther points have this one.
+    """
+    found = np.full(len(points), most)
+    # boxes still to be looked at, at most one of each level and one more; the nearer one first
+    waiting, squares = np.empty((len(levels) + 1, 2), dtype=np.intp), np.empty(len(levels) + 1)
+    ab, ac, away, normal = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for i in range(len(points)):
+        p, best, height = points[i], most * most, 0.0
+        waiting[0, 0], waiting[0, 1], more = len(levels) - 2, 0, 1
+        squares[0] = _box_square(boxes[levels[len(levels) - 2]], p)
+        while more:
+            more -= 1
+            # of triangles equally near, which share an edge or a corner, all are looked at
+            if squares[more] > best * (1.0 + 1e-9):
+                continue
+            level, box = waiting[more]
+            if level > 0:
+                first, second = 2 * box, 2 * box + 1
+                near = _box_square(boxes[levels[level - 1] + first], p)
+                far = math.inf
+                if levels[level - 1] + second < levels[level]:
+                    far = _box_square(boxes[levels[level - 1] + second], p)
+                if far < near:
+                    first, second, near, far = second, first, far, near
+                if far < math.inf:
+                    waiting[more, 0], waiting[more, 1], squares[more] = level - 1, second, far
+                    more += 1
+                waiting[more, 0], waiting[more, 1], squares[more] = level - 1, first, near
+                more += 1
+                continue
+            for at in order[box * LEAF_SIZE : (box + 1) * LEAF_SIZE]:
+                a, b, c = vertices[faces[at, 0]], vertices[faces[at, 1]], vertices[faces[at, 2]]
+                for k in range(3):
+                    ab[k], ac[k], away[k] = b[k] - a[k], c[k] - a[k], p[k] - a[k]
+                d1, d2 = _dot(ab, away), _dot(ac, away)
+                bb, cc, bc = _dot(ab, ab), _dot(ac, ac), _dot(ab, ac)
+                v, w = _on_triangle((d1, d2, d1 - bb, d2 - bc, d1 - bc, d2 - cc))
+                for k in range(3):
+                    away[k] -= v * ab[k] + w * ac[k]
+                square = _dot(away, away)
+                if square > best * (1.0 + 1e-9):
+                    continue
+                for k in range(3):
+                    m, n = (k + 1) % 3, (k + 2) % 3
+                    normal[k] = ab[m] * ac[n] - ab[n] * ac[m]
+                over = _dot(normal, away) / math.sqrt(max(_dot(normal, normal), 1e-300))
+                if square < best * (1.0 - 1e-9) or abs(over) > abs(height):
+                    height = over
+                best = min(best, square)
+        found[i] = math.copysign(math.sqrt(best), height) if best < most * most else most
+    return found

@@ -137,7 +137,7 @@ class Mesh(OutlinedHold):
         rays = 5  # along each side of the palm
         x, y = np.meshgrid(*(np.linspace(-half, half, rays) for half in view))
         places = there.apply(np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)]))
-        if self._cells.lines(places, there.rotation[:, 2])[1].sum() < 0:
+        if self.cells.lines(places, there.rotation[:, 2])[1].sum() < 0:
             raise InvalidInputError(
                 "the triangles under the palm face away from it: is the approach into the rock? "
                 "their vertices must be counterclockwise seen from outside the rock: flip every "
@@ -149,7 +149,7 @@ class Mesh(OutlinedHold):
     def _check_near(self, near: float) -> None:
         """Check that a triangle is so near to the origin along each axis [m]."""
         most = np.full(3, near)
-        found = self.triangles.faces[self._cells.within(np.eye(3), -most, most)]
+        found = self.triangles.faces[self.cells.within(np.eye(3), -most, most)]
         corners = self.triangles.vertices[found]
         beside = (corners.min(axis=1) <= near) & (corners.max(axis=1) >= -near)
         if not beside.all(axis=1).any():
@@ -177,10 +177,11 @@ class Mesh(OutlinedHold):
         origin, s, t = plane
         axes, reach = np.array([skew(s) @ t, s, t]), self._scale.reach
         beside, middle = np.array([half, reach, reach]), axes @ origin
-        return self._cells.within(axes, middle - beside, middle + beside)
+        return self.cells.within(axes, middle - beside, middle + beside)
 
     @cached_property
-    def _cells(self) -> TriangleCells:
+    def cells(self) -> TriangleCells:
+        """Spatial index of the repaired mesh."""
         return TriangleCells(self.triangles)
 
     def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
@@ -196,7 +197,7 @@ class Mesh(OutlinedHold):
 
     def entries(self, points: ArrayLike, direction: ArrayLike) -> list[float]:
         places, along = np.array(points, float, order="C"), np.asarray(direction, dtype=float)
-        found: list[float] = self._cells.lines(places, along)[0].tolist()
+        found: list[float] = self.cells.lines(places, along)[0].tolist()
         return found
 
 

@@ -370,3 +370,18 @@ class TriangleCells:
         slack = BASE_TOLERANCES.relative
         (vertices, faces), tree = self._triangles, (self._order, self._boxes, self._levels)
         return lines_met(vertices, faces, *tree, points, axes, slack)
+
+    def distances(self, points: Array, most: float) -> Array:
+        """Return how far points are from the mesh, shape (n,) [m]; negative behind its triangles.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, 3)
+            Where it is measured from [m].
+        most : float
+            Distance up to which it is measured [m]; farther points have this one.
+        """
+        from hand_models.rock.compiled_cells import distances_from
+
+        (vertices, faces), tree = self._triangles, (self._order, self._boxes, self._levels)
+        return distances_from(vertices, faces, *tree, np.ascontiguousarray(points), most)

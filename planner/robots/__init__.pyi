@@ -3,6 +3,7 @@ from .inverse_kinematics import (
     UnreachableError as UnreachableError,
     solve_limbs as solve_limbs,
 )
+from .limb_batch import LimbBatch as LimbBatch
 from .link_tree import LimbTorques as LimbTorques, LinkTree as LinkTree
 from .payload import (
     Payload as Payload,
@@ -10,6 +11,7 @@ from .payload import (
     check_carrier as check_carrier,
     held_up as held_up,
 )
+from .pose_search import damped_step as damped_step, postures_near as postures_near
 from .robot import (
     Robot as Robot,
     robosimian as robosimian,

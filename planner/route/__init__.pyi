@@ -6,6 +6,12 @@ from .climb import (
     RouteStage as RouteStage,
 )
 from .evaluation import evaluate as evaluate
+from .knots import (
+    Climb as Climb,
+    Failure as Failure,
+    HandKnot as HandKnot,
+    Knot as Knot,
+)
 from .survival import (
     RouteShare as RouteShare,
     RouteSurvival as RouteSurvival,

@@ -13,7 +13,7 @@ from planner.robots import Robot
 from planner.scene.scene import Scene
 from planner.scene.solids import Solid, capsule_solids, distance_between, hand_solids, rock_solids
 
-__all__ = ["body_clearance", "clearance", "link_findings"]
+__all__ = ["body_clearance", "clearance", "link_findings", "unjoined_pairs"]
 
 
 class _Pairs(NamedTuple):
@@ -198,23 +198,47 @@ def _with_rock(scene: Scene, solids: Sequence[Solid], rocks: Sequence[Solid]) ->
 def _among_links(scene: Scene, links: Sequence[Solid], hands: Sequence[Solid]) -> _Pairs:
     """Return links with links, the body and hands, but for those that are joined.
 
-    So are parts of one link, and those joined by joints that are nearer than both are thick. Hands
-    are measured from each other and from the body without joints.
+    Hands are measured from each other and from the body without joints.
     """
-    robot, solids = scene.stance.robot, (*links, *hands)
-    order = [None, *robot.limbs]
-    limb = np.array([order.index(each) for each in (*robot.capsules.limbs, *scene.limbs)])
-    ends = [len(robot.chains[each].moving) for each in scene.limbs]
-    step = np.append(robot.capsules.steps, ends)
+    solids = (*links, *hands)
     radii = np.array([solid.shape.radius for solid in solids])
-    i, j = np.triu_indices(len(solids), 1)
+    which = unjoined_pairs(scene.stance.robot, scene.limbs, radii)
+    body = len(scene.stance.robot.body_capsules[1])
+    i, j = which.T
+    of_hands = (j >= len(links)) & ((i >= len(links)) | (i < body))
+    return _pairs(solids, solids, which[~of_hands])
+
+
+def unjoined_pairs(robot: Robot, limbs: Sequence[str], radii: Array) -> Indices:
+    """Return pairs of a robot's capsules, and of some limbs' hands, that may meet, shape (k, 2).
+
+    Those that are joined are left out: parts of one link, of neighbouring links, and of links
+    joined by joints that are nearer than both are thick.
+
+    Parameters
+    ----------
+    robot : Robot
+    limbs : sequence of str, length h
+        Limbs with a hand.
+    radii : ndarray, shape (n + h,)
+        Radii of the robot's n capsules, and then of the hands [m].
+
+    Returns
+    -------
+    ndarray of int, shape (k, 2)
+        Indices from 0 to n + h − 1, the lower first.
+    """
+    order = [None, *robot.limbs]
+    limb = np.array([order.index(each) for each in (*robot.capsules.limbs, *limbs)])
+    ends = [len(robot.chains[each].moving) for each in limbs]
+    step = np.append(robot.capsules.steps, ends)
+    i, j = np.triu_indices(len(radii), 1)
     near, far = np.minimum(step[i], step[j]), np.maximum(step[i], step[j])
     along, whose = _along(robot), np.maximum(limb[i], limb[j])
     between = along[whose, far] - along[whose, near + 1]
     alike = (limb[i] == limb[j]) | (limb[i] == 0) | (limb[j] == 0)
     joined = alike & ((far - near <= 1) | (between < radii[i] + radii[j]))
-    of_hands = (j >= len(links)) & ((i >= len(links)) | (limb[i] == 0))
-    return _pairs(solids, solids, np.column_stack([i, j])[~(joined | of_hands)])
+    return np.asarray(np.column_stack([i, j])[~joined])
 
 
 def _along(robot: Robot) -> Array:

@@ -9,11 +9,11 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import Array, Pose
-from hand_models.hand import SettledHand
+from hand_models.hand import SettledHand, SpinyHand
 from hand_models.sections import Swept
 from planner.question import HandOnHold, Stance
 
-__all__ = ["Scene", "scene_of", "smooth_depths"]
+__all__ = ["SCENE_SETTINGS", "Scene", "palm_capsule", "scene_of", "smooth_depths"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,17 +92,21 @@ class Scene:
 
     @property
     def palms(self) -> tuple[Array, float]:
-        """Capsule that stands for each hand: segments (n, 2, 3) in B, and radius [m].
-
-        The capsule lies behind the palm's face. It is as long as the palm and as wide as the bases
-        of its outer fingers.
-        """
-        hand = self.stance.robot.hand
-        radius = min(abs(hand.outer_axis.item(1)), 0.5 * hand.palm_length)
-        half = 0.5 * hand.palm_length - radius
-        segment = np.array([[-half, 0.0, -radius], [half, 0.0, -radius]])
+        """Capsule of each hand (`palm_capsule`): segments (n, 2, 3) in B, and radius [m]."""
+        segment, radius = palm_capsule(self.stance.robot.hand)
         turned = np.einsum("nxy,ky->nkx", self.axes, segment)
         return self.places[:, None] + turned, radius
+
+
+def palm_capsule(hand: SpinyHand) -> tuple[Array, float]:
+    """Return the capsule that stands for a hand: its segment (2, 3) in H, and radius [m].
+
+    The capsule lies behind the palm's face. It is as long as the palm and as wide as the bases of
+    its outer fingers.
+    """
+    radius = min(abs(hand.outer_axis.item(1)), 0.5 * hand.palm_length)
+    half = 0.5 * hand.palm_length - radius
+    return np.array([[-half, 0.0, -radius], [half, 0.0, -radius]]), radius
 
 
 def scene_of(stance: Stance, settled: Sequence[SettledHand]) -> Scene:

@@ -11,7 +11,13 @@ from hypothesis import given, strategies as st
 
 from hand_models.rock import Mesh, Triangles
 from hand_models.rock.triangles import TriangleCells
-from tests.suite.helpers.rocks import fractal_wall, random_axes, random_mesh
+from tests.suite.helpers.rocks import (
+    distance,
+    fractal_wall,
+    from_triangles,
+    random_axes,
+    random_mesh,
+)
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -65,3 +71,26 @@ def test_a_mesh_that_has_been_cut_may_go_to_another_process():
     plane = np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
     here, there = (each.section(*plane) for each in (hold, pickle.loads(pickle.dumps(hold))))
     np.testing.assert_array_equal(here.pieces[0], there.pieces[0])
+
+
+@given(seeds)
+def test_points_are_as_far_from_triangles_as_from_the_nearest(seed):
+    rng = np.random.default_rng(seed)
+    triangles, points = soup(rng), rng.normal(0.0, 0.7, (20, 3))
+    corners = triangles.vertices[triangles.faces]
+    want = np.abs(from_triangles(corners, points))
+    cells = TriangleCells(triangles)
+    assert np.abs(cells.distances(points, 10.0)) == pytest.approx(want, abs=1e-7)
+    near = cells.distances(points, 0.3)
+    assert np.abs(near) == pytest.approx(np.minimum(want, 0.3), abs=1e-7)
+    assert (near[want > 0.3] == 0.3).all()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_points_inside_a_boulder_are_behind_its_triangles(seed):
+    """By solid angles, which say what is inside whatever is nearest."""
+    rng = np.random.default_rng(seed)
+    hold = random_mesh(rng)
+    points = rng.choice(hold.triangles.vertices, 300)
+    points = points + rng.normal(0.0, 0.1, points.shape) * np.ptp(points, axis=0)
+    assert hold.cells.distances(points, 10.0) == pytest.approx(distance(hold, points), abs=1e-9)

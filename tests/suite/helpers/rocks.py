@@ -78,12 +78,13 @@ def _from_mesh(hold: Mesh, points: np.ndarray) -> np.ndarray:
     corners = hold.triangles.vertices[hold.triangles.faces]
     flat = points.reshape(-1, 3)
     found = np.concatenate(
-        [_from_triangles(corners, part) for part in np.array_split(flat, len(flat) // 100 + 1)]
+        [from_triangles(corners, part) for part in np.array_split(flat, len(flat) // 100 + 1)]
     )
     return found.reshape(points.shape[:-1])
 
 
-def _from_triangles(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+def from_triangles(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Distance of points from triangles (n, 3, 3) [m]; negative where solid angles add to 4π."""
     a, b, c = corners.transpose(1, 0, 2)
     away = np.full((len(points), len(corners)), math.inf)
     for p, q in ((a, b), (b, c), (c, a)):

@@ -1,0 +1,6 @@
+"""Joint motions of limbs: branches of inverse kinematics, collisions, and swings of a hand."""
+
+import lazy_loader
+import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

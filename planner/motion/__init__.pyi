@@ -1,0 +1,22 @@
+from .branch import (
+    BranchEndError as BranchEndError,
+    branches as branches,
+    follow_poses as follow_poses,
+    pose_between as pose_between,
+    shift_postures as shift_postures,
+)
+from .collisions import (
+    CollisionScene as CollisionScene,
+    JointSpace as JointSpace,
+    Nearest as Nearest,
+)
+from .rocks import Rock as Rock, rock_distances as rock_distances, rocks_of as rocks_of
+from .settings import MOTION_SETTINGS as MOTION_SETTINGS, MotionSettings as MotionSettings
+from .swings import (
+    NoWayError as NoWayError,
+    Swing as Swing,
+    check_shift as check_shift,
+    clear_branches as clear_branches,
+    swing as swing,
+)
+from .ways import Clear as Clear, check_way as check_way

@@ -1,0 +1,305 @@
+"""One branch of a limb's inverse kinematics kept along a path of hand poses, and several to choose.
+
+The step to the next pose is Newton's of least norm (kinematics by Pinocchio). A limb of more than
+six joints also moves a little along directions that leave its hand where it is, as much as its
+joints turn anyway: off its limits and off postures in which its hand cannot move every way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from hand_models.base import Array, InvalidInputError, Pose, turns_about
+from planner import deadline
+from planner.motion.settings import MOTION_SETTINGS
+from planner.robots import LimbBatch, Robot, damped_step, postures_near
+
+__all__ = ["BranchEndError", "branches", "follow_poses", "pose_between", "shift_postures"]
+
+
+class BranchEndError(InvalidInputError):
+    """Error of a hand that cannot follow its path with joint angles that change steadily.
+
+    Parameters
+    ----------
+    limb : str
+    share : float
+        Part of the path that was followed, from 0 to 1.
+    lacks : str
+        What keeps the limb from going on.
+
+    Attributes
+    ----------
+    limb, share, lacks
+        The parameters.
+    """
+
+    kind = "unreachable"
+
+    def __init__(self, limb: str, share: float, lacks: str) -> None:
+        super().__init__(
+            f"{limb} cannot follow its hand's path beyond {100.0 * share:.0f} % of it: {lacks}; "
+            "start from another posture, or choose another path"
+        )
+        self.limb, self.share, self.lacks = limb, share, lacks
+
+
+def pose_between(first: Pose, second: Pose, part: float) -> Pose:
+    """Return a pose between two: position on the straight line, along the shortest turn.
+
+    Parameters
+    ----------
+    first, second : Pose
+    part : float
+        Progress from 0 to 1.
+    """
+    turn = pin.log3(first.rotation.T @ second.rotation)
+    place = first.position + part * (second.position - first.position)
+    return Pose(place, first.rotation @ turns_about(part * turn))
+
+
+class _Limb:
+    """A limb's kinematics, by Pinocchio."""
+
+    def __init__(self, robot: Robot, limb: str) -> None:
+        self.limb, self.chain = limb, robot.chains[limb]
+        self._robot, self._q = robot, robot.configuration({})
+        self._still = self.target(Pose.identity())
+
+    def target(self, pose: Pose) -> Any:
+        """Return a pose of H in B as Pinocchio's, in the root link."""
+        there = self._robot.root @ pose
+        return pin.SE3(there.rotation, there.position)
+
+    def errors(self, angles: Array, target: Any) -> tuple[Array, Array]:
+        """Return the twist in H to a target, (6,), over the reach, and its Jacobian (6, n)."""
+        model, data, chain = self._robot.model, self._robot.data, self.chain
+        chain.turn(self._q, angles)
+        pin.computeJointJacobians(model, data, self._q)
+        off = pin.updateFramePlacement(model, data, chain.frame).actInv(target)
+        jacobian = pin.getFrameJacobian(model, data, chain.frame, pin.ReferenceFrame.LOCAL)
+        J = jacobian[:, chain.columns] @ chain.coupling
+        error = np.concatenate([off.translation, pin.log3(off.rotation)])
+        error[:3] /= chain.reach
+        J[:3] /= chain.reach
+        return error, J
+
+    def follow(self, start: Array, pose: Pose) -> Array | None:
+        """Return angles near others that solve a pose; None if none are near enough."""
+        target, chain, settings = self.target(pose), self.chain, MOTION_SETTINGS
+        angles, drift = start, None
+        for _ in range(settings.newton_steps):
+            error, J = self.errors(angles, target)
+            if np.abs(error).max() <= settings.pose_error:
+                return angles
+            if drift is None:
+                drift = self._drift(start, J)
+            free = np.ones(len(angles))
+            for _ in range(len(angles)):
+                step = _least_step(J * free, error)
+                # a joint at a limit that it would leave stays there
+                stuck = (angles <= chain.lower) & (step < 0.0)
+                stuck |= (angles >= chain.upper) & (step > 0.0)
+                if not stuck.any():
+                    break
+                free[stuck] = 0.0
+            # at first, as much as the joints turn anyway
+            step = step + drift * np.abs(step).max()
+            drift *= 0.0
+            angles = np.clip(angles + step, chain.lower, chain.upper)
+            if np.abs(angles - start).max() > settings.largest_step:
+                return None
+        return None
+
+    def _drift(self, angles: Array, J: Array) -> Array:
+        """Return the motion that leaves the hand and eases the limb, (n,), at most 1 a joint.
+
+        It goes down the slope of −½ log det J Jᵀ − Σ log (room of a joint in its range), in
+        directions that leave the hand where it is, so that a redundant limb keeps off its limits
+        and off postures in which it cannot move every way.
+        """
+        chain, drift = self.chain, np.zeros(len(angles))
+        if len(angles) <= len(J):
+            return drift
+        bounded = np.isfinite(chain.upper - chain.lower)
+        low, high = (angles - chain.lower)[bounded], (chain.upper - angles)[bounded]
+        slope, h = np.zeros(len(angles)), 1e-4  # [rad] of the difference quotient
+        slope[bounded] = 1.0 / np.maximum(high, h) - 1.0 / np.maximum(low, h)
+        for along in np.linalg.svd(J)[2][len(J) :]:
+            ends = [self._mobility(angles + side * h * along) for side in (-1.0, 1.0)]
+            rise = slope @ along - (ends[1] - ends[0]) / (2.0 * h)
+            drift -= along * np.clip(rise, -1.0, 1.0)
+        return drift
+
+    def _mobility(self, angles: Array) -> float:
+        """Return ½ log det J Jᵀ: the logarithm of how well the hand moves every way [1]."""
+        _, J = self.errors(angles, self._still)
+        return 0.5 * float(np.linalg.slogdet(J @ J.T + 1e-12 * np.eye(6))[1])
+
+    def lacking(self, angles: Array, pose: Pose) -> str:
+        """Say what keeps the limb from a pose, from the angles that it has."""
+        chain, (error, J) = self.chain, self.errors(angles, self.target(pose))
+        within, slope = MOTION_SETTINGS.at_limit, error @ J
+        low = (angles - chain.lower < within) & (slope < 0.0)
+        high = (chain.upper - angles < within) & (slope > 0.0)
+        stopped = []
+        for i in np.flatnonzero(low | high).tolist():
+            limit = chain.lower[i] if low[i] else chain.upper[i]
+            unit = "m" if chain.sliding[i] else "rad"
+            stopped.append(f"{chain.joints[i]} is at its limit of {limit:.4g} {unit}")
+        if np.linalg.svd(J, compute_uv=False)[-1] < MOTION_SETTINGS.singular:
+            stopped.append("it is stretched or folded, so that the hand cannot move every way")
+        if not stopped:
+            step = MOTION_SETTINGS.largest_step
+            stopped.append(f"a joint would turn by more than {step:g} rad at once")
+        way, turn = np.linalg.norm(error[:3]) * chain.reach, np.linalg.norm(error[3:])
+        return f"{', and '.join(stopped)}, {1e3 * way:.3g} mm and {turn:.2g} rad from the next pose"
+
+
+def _least_step(J: Array, error: Array) -> Array:
+    """Return the least step by which a hand's error vanishes, or gets least with few joints."""
+    small = J @ J.T if J.shape[1] > len(J) else J.T @ J
+    small = small + 1e-12 * np.eye(len(small))  # a stretched limb's is singular
+    if J.shape[1] > len(J):
+        return np.asarray(J.T @ np.linalg.solve(small, error))
+    return np.asarray(np.linalg.solve(small, J.T @ error))
+
+
+def follow_poses(robot: Robot, limb: str, start_angles: Array, poses: Sequence[Pose]) -> Array:
+    """Return joint angles that keep a limb's hand on a path, on one branch.
+
+    Parameters
+    ----------
+    robot : Robot
+    limb : str
+    start_angles : ndarray, shape (n,)
+        Angles from which the first pose is reached by a small motion [rad].
+    poses : sequence of Pose, length m
+        Poses of H in B. Between two of them the path is followed in steps so small that no joint
+        turns by more than `MotionSettings.largest_step`.
+
+    Returns
+    -------
+    ndarray, shape (m, n)
+        Joint angles within their limits that put H on each pose [rad].
+
+    Raises
+    ------
+    BranchEndError
+        If the branch ends; the error says where, and what is missing.
+    DeadlineError
+        If the deadline passes first.
+    """
+    one, found = _Limb(robot, limb), []
+    angles = np.asarray(start_angles, dtype=float)
+    before = robot.hand_poses({limb: angles})[limb]
+    for i, pose in enumerate(poses):
+        deadline.check("a limb had followed its hand's path")
+        done, step = 0.0, 1.0
+        while done < 1.0:
+            part = min(done + step, 1.0)
+            target = pose if part == 1.0 else pose_between(before, pose, part)
+            moved = one.follow(angles, target)
+            if moved is None:
+                step *= 0.5
+                if step < 0.5**MOTION_SETTINGS.finest:
+                    share = (i + done) / len(poses)
+                    raise BranchEndError(limb, share, one.lacking(angles, pose))
+                continue
+            angles, done = moved, part
+            step *= 2.0
+        found.append(angles)
+        before = pose
+    return np.array(found).reshape(len(poses), -1)
+
+
+def shift_postures(
+    robot: Robot,
+    hands: Mapping[str, Pose],
+    bodies: Sequence[Pose],
+    start: Mapping[str, Array],
+) -> dict[str, Array]:
+    """Return joint angles of limbs whose hands stay where they are while the body moves.
+
+    Parameters
+    ----------
+    robot : Robot
+    hands : mapping of str to Pose
+        Pose of H in the world frame W, by limb.
+    bodies : sequence of Pose, length m
+        Poses of B in W, one after the other.
+    start : mapping of str to ndarray, shape (n,)
+        Joint angles before the first of them, by limb [rad].
+
+    Returns
+    -------
+    dict of str to ndarray, shape (m, n)
+        Joint angles at each pose of the body, by limb [rad].
+
+    Raises
+    ------
+    BranchEndError
+        If the branch of a limb ends.
+    DeadlineError
+        If the deadline passes first.
+    """
+    inverse = [body.inverse() for body in bodies]
+    return {
+        limb: follow_poses(robot, limb, start[limb], [body @ hand for body in inverse])
+        for limb, hand in hands.items()
+    }
+
+
+def branches(
+    robot: Robot, limb: str, pose: Pose, near: Array | None = None, count: int = 6
+) -> tuple[Array, ...]:
+    """Return joint angles of several kinds that put a limb's hand on a pose.
+
+    They are found from random postures whose hand is near the pose; two of them differ by more than
+    `MotionSettings.alike` in some joint. None may be found where there are some.
+
+    Parameters
+    ----------
+    robot : Robot
+    limb : str
+    pose : Pose
+        Pose of H in B.
+    near : ndarray, shape (n,), optional
+        Angles that the first ones are to be nearest to [rad]; by default those come first whose
+        joints are farthest from their limits.
+    count : int
+        Number of solutions at most.
+
+    Returns
+    -------
+    tuple of ndarray, shape (n,)
+        Joint angles within their limits [rad].
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline passes first.
+    """
+    batch = LimbBatch(robot, {limb: pose}, {}, np.zeros(3))
+    starts = postures_near(batch, 0, MOTION_SETTINGS.starts)
+    angles = (starts if near is None else np.vstack([near, starts]))[:, None]
+    for _ in range(MOTION_SETTINGS.branch_steps):
+        deadline.check("postures with a hand on its hold were found")
+        errors, jacobians = batch.errors(angles)
+        left = np.abs(errors).max(axis=(1, 2)) > MOTION_SETTINGS.pose_error
+        if not left.any():
+            break
+        angles[left] = damped_step(batch, angles[left], errors[left], jacobians[left])
+    errors, _ = batch.errors(angles)
+    solved = angles[np.abs(errors).max(axis=(1, 2)) <= MOTION_SETTINGS.pose_error, 0]
+    room = np.minimum(solved - batch.lower, batch.upper - solved).min(axis=1)
+    rank = -room if near is None else np.abs(solved - near).max(axis=1)
+    found: list[Array] = []
+    for each in solved[rank.argsort(kind="stable")]:
+        if all(np.abs(each - other).max() > MOTION_SETTINGS.alike for other in found):
+            found.append(each)
+    return tuple(found[:count])

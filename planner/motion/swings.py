@@ -1,0 +1,267 @@
+"""The swing of a hand from one hold to the next, as joint angles that are proven to be clear.
+
+The hand goes straight back from its old hold, along −z of H, then along a way in joint space, and
+straight on to the new hold, along z of H.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from hand_models.base import Array, InvalidInputError, Pose
+from planner.motion.branch import BranchEndError, branches, follow_poses
+from planner.motion.collisions import CollisionScene, JointSpace, Nearest
+from planner.motion.ways import Clear, check_way, search_way
+from planner.robots import Robot, scene_number
+
+__all__ = ["NoWayError", "Swing", "check_shift", "clear_branches", "swing"]
+
+
+class NoWayError(InvalidInputError):
+    """Error of a limb for which no clear way to its new hold was found.
+
+    Parameters
+    ----------
+    limb : str
+    where : str
+        Part of the swing, as a clause.
+    nearest : Nearest
+        What meets there.
+    margin : float
+        Distance that is needed [m].
+
+    Attributes
+    ----------
+    limb, where, nearest, margin
+        The parameters.
+    """
+
+    kind = "unreachable"
+
+    def __init__(self, limb: str, where: str, nearest: Nearest, margin: float) -> None:
+        super().__init__(
+            f"{limb} has no way to its new hold: {where}, {nearest}, and {1e3 * margin:.3g} mm "
+            "are needed; shift the body, or choose another hold"
+        )
+        self.limb, self.where, self.nearest, self.margin = limb, where, nearest, margin
+
+
+@dataclass(frozen=True, eq=False)
+class Swing:
+    """Joint angles of a limb on the way from one hold to the next.
+
+    Attributes
+    ----------
+    limb : str
+    path : ndarray, shape (m, n)
+        Joint angles at the corners of the way [rad]; between two of them joints turn in proportion.
+    retreat, approach : int
+        Index of the corner at which the hand has gone back from its old hold, and from which it
+        goes straight on to the new one.
+    nearest : Nearest
+        The least distance that was met between those two corners.
+    bound : float
+        Proven lower bound of all distances between them [m].
+    how : {'straight', 'searched'}
+        Whether the way between them is one straight line in joint space.
+    """
+
+    limb: str
+    path: Array
+    retreat: int
+    approach: int
+    nearest: Nearest
+    bound: float
+    how: Literal["straight", "searched"]
+
+
+def swing(
+    scene: CollisionScene,
+    body: Pose,
+    joints: Mapping[str, Array],
+    limb: str,
+    goals: Sequence[Array],
+    *,
+    stand_off: float | None = None,
+    margin: float | None = None,
+    seed: int = 0,
+) -> Swing:
+    """Find the swing of a limb's hand from its hold to the next one, while all else stays.
+
+    Parameters
+    ----------
+    scene : CollisionScene
+        The robot and all rock; both holds of the limb have it among their ``limbs``.
+    body : Pose
+        Pose of B in W.
+    joints : mapping of str to ndarray, shape (n,)
+        Joint angles of every limb at the start [rad]; a limb left out is not measured.
+    limb : str
+        The limb that swings.
+    goals : sequence of ndarray, shape (n,)
+        Joint angles with the hand on its new hold, the best ones first [rad].
+    stand_off : float, optional
+        Distance of the hand from its holds in the swing [m]; that of ``parameters/scene.toml`` by
+        default.
+    margin : float, optional
+        Least distance of links and hands from each other and from rock [m]; that of
+        ``parameters/scene.toml`` by default.
+    seed : int
+        Seed of the search's random directions.
+
+    Raises
+    ------
+    NoWayError
+        If no clear way was found; the error says which link meets what.
+    BranchEndError
+        If the hand cannot go straight back from its hold, or onto the new one.
+    DeadlineError
+        If the deadline passes first.
+    """
+    robot, start = scene.robot, np.asarray(joints[limb], dtype=float)
+    stand_off = scene_number("motion", "stand_off") if stand_off is None else stand_off
+    margin = scene_number("motion", "margin") if margin is None else margin
+    others = [each for each in joints if each != limb]
+    free = JointSpace(scene, [body], joints, (limb,), touching=others)
+
+    def leaving(angles: Array, which: str) -> Array:
+        """Return joint angles, shape (m, n), with which the hand goes straight back from a hold."""
+        held = JointSpace(scene, [body], {**joints, limb: angles}, (limb,), touching=robot.limbs)
+        way = _straight(robot, limb, angles, stand_off)
+        _require(limb, check_way(held, way, 0.0), f"beside its {which} hold", 0.0)
+        _require(limb, check_way(free, way[-1:], margin), f"in front of its {which} hold", margin)
+        return way
+
+    back = leaving(start, "old")
+    onto: list[Array] = []
+    refused: list[BranchEndError | NoWayError] = []
+    for goal in goals:
+        try:
+            onto.append(leaving(np.asarray(goal, dtype=float), "new")[::-1])
+        except (BranchEndError, NoWayError) as error:
+            refused.append(error)
+            continue
+        line = np.array([back[-1], onto[-1][0]])
+        seen = check_way(free, line, margin)
+        if seen.clear:
+            return _joined(limb, back, line, onto[-1], seen, "straight")
+        refused.append(NoWayError(limb, "on the straight way in joint space", seen.nearest, margin))
+    if not refused:
+        raise InvalidInputError("at least one is needed", field="goals")
+    if onto:
+        ends = np.array([each[0] for each in onto])
+        found = search_way(free, back[-1], ends, margin, seed)
+        if found is not None:
+            way, seen = found
+            which = int(np.abs(ends - way[-1]).max(axis=1).argmin())
+            return _joined(limb, back, way, onto[which], seen, "searched")
+    raise refused[0]
+
+
+def _straight(robot: Robot, limb: str, angles: Array, stand_off: float) -> Array:
+    """Return joint angles, shape (m, n), with which a hand goes straight back from its hold."""
+    pose = robot.hand_poses({limb: angles})[limb]
+    away = np.linspace(0.0, stand_off, 6)[1:, None] * -pose.rotation[:, 2]
+    poses = [Pose(pose.position + each, pose.rotation) for each in away]
+    return np.vstack([angles, follow_poses(robot, limb, angles, poses)])
+
+
+def _require(limb: str, seen: Clear, where: str, margin: float) -> None:
+    if not seen.clear:
+        raise NoWayError(limb, where, seen.nearest, margin)
+
+
+def _joined(
+    limb: str,
+    back: Array,
+    way: Array,
+    on: Array,
+    seen: Clear,
+    how: Literal["straight", "searched"],
+) -> Swing:
+    path = np.vstack([back, way[1:], on[1:]])
+    retreat = len(back) - 1
+    return Swing(limb, path, retreat, retreat + len(way) - 1, seen.nearest, seen.bound, how)
+
+
+def clear_branches(
+    scene: CollisionScene,
+    body: Pose,
+    joints: Mapping[str, Array],
+    limb: str,
+    pose: Pose,
+    *,
+    margin: float | None = None,
+    count: int = 8,
+) -> tuple[Array, ...]:
+    """Return joint angles of several kinds that put a hand on its hold, clear of all else.
+
+    Parameters
+    ----------
+    scene : CollisionScene
+    body : Pose
+        Pose of B in W.
+    joints : mapping of str to ndarray, shape (n,)
+        Joint angles of the other limbs, of which one left out is not measured; and if known those of
+        this one that the first ones are to be nearest to [rad].
+    limb : str
+    pose : Pose
+        Pose of H in W, closed on its hold.
+    margin : float, optional
+        As of `swing`.
+    count : int
+        Number of kinds that are looked at, at most.
+
+    Returns
+    -------
+    tuple of ndarray, shape (n,)
+        Joint angles in the order of `branches` [rad]; none if no clear ones were found.
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline passes first.
+    """
+    margin = scene_number("motion", "margin") if margin is None else margin
+    robot, found = scene.robot, []
+    for angles in branches(robot, limb, body.inverse() @ pose, joints.get(limb), count):
+        held = JointSpace(scene, [body], {**joints, limb: angles}, (limb,), touching=robot.limbs)
+        if held.clearances(angles[None], margin).min() >= margin:
+            found.append(angles)
+    return tuple(found)
+
+
+def check_shift(
+    scene: CollisionScene,
+    bodies: Sequence[Pose],
+    joints: Mapping[str, Array],
+    *,
+    margin: float | None = None,
+) -> Clear:
+    """Prove that the robot is clear while its body shifts on hands that stay, or find where not.
+
+    Parameters
+    ----------
+    scene : CollisionScene
+    bodies : sequence of Pose, length m, at least 2
+        Poses of B in W, from the first one on; between two of them position and joint angles change
+        linearly, and the orientation along the shortest turn.
+    joints : mapping of str to ndarray, shape (m, n)
+        Angles of the limbs' joints [rad]; a limb left out is not measured.
+    margin : float, optional
+        As of `swing`.
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline passes first.
+    """
+    margin = scene_number("motion", "margin") if margin is None else margin
+    first = {limb: angles[0] for limb, angles in joints.items()}
+    space = JointSpace(scene, bodies, first, tuple(joints), touching=scene.robot.limbs)
+    progress = np.arange(float(len(bodies)))[:, None]
+    return check_way(space, np.hstack([*joints.values(), progress]), margin)

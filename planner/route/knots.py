@@ -1,0 +1,142 @@
+"""Knots of a climb: what a controller sends at one time of a move, and the climb made of them.
+
+Between two neighbouring knots a controller interpolates linearly in time: joint angles, tendon
+tensions, and the position of the body (its orientation along the shortest turn).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+from hand_models.base import Array, Pose, wrench_transport
+from planner.result import LimitName
+from planner.route.climb import Route
+
+__all__ = ["Climb", "Failure", "HandKnot", "Knot", "KnotPhase"]
+
+KnotPhase = Literal["start", "shift", "unload", "open", "swing", "close", "load"]
+"""Part of a move that a knot ends: the body shifts, the leaving hand is unloaded to its closing
+tensions, opens, swings, closes on its new hold, and is loaded."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class HandKnot:
+    """A hand at a knot.
+
+    Attributes
+    ----------
+    limb : str
+    pose : Pose
+        Pose of the hand frame H in the world frame W.
+    on_rock : bool
+        Whether the hand touches its hold.
+    tensions, winch_angles : ndarray, shape (4,)
+        Tension [N] and winch angle [rad] of each tendon.
+    wrench : ndarray, shape (6,)
+        Wrench of the hand on the rock, in H [N, N·m]; zero in the air.
+    """
+
+    limb: str
+    pose: Pose
+    on_rock: bool
+    tensions: Array
+    winch_angles: Array
+    wrench: Array
+
+    @cached_property
+    def wrench_in_world(self) -> Array:
+        """Wrench of the rock on the hand, in W about its origin, shape (6,) [N, N·m]."""
+        return -(wrench_transport(self.pose) @ self.wrench)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Knot:
+    """One time of a climb: poses, joint angles, and verified loads of all hands.
+
+    Attributes
+    ----------
+    index : int
+        From zero, in climbing order.
+    move : int
+        Number of the move, from one; zero for the start.
+    phase : {'start', 'shift', 'unload', 'open', 'swing', 'close', 'load'}
+        Part of the move that this knot ends, or is in.
+    limb : str or None
+        Limb that moves; None for the start.
+    stage : int or None
+        Index of the route's stage that this knot is the plan of; None between stages.
+    time : float
+        Since the start, at the rates of the controller [s].
+    body : Pose
+        Pose of the body frame B in W.
+    joints, joint_torque : mapping of str to ndarray, shape (n,)
+        Joint angles [rad] and torques [N·m] of every limb.
+    hands : tuple of HandKnot
+        Of every limb that has a hand in the route, in the order of the start stance.
+    utilisation : float
+        Largest load over capacity of all limits.
+    bound : float or None
+        Largest utilisation from the knot before to this one, while a controller interpolates; None
+        for the start.
+    limiting : LimitName or None
+        The limit with the largest utilisation.
+    verified : bool
+        Whether the independent check passed.
+    """
+
+    index: int
+    move: int
+    phase: KnotPhase
+    limb: str | None
+    stage: int | None
+    time: float
+    body: Pose
+    joints: Mapping[str, Array]
+    joint_torque: Mapping[str, Array]
+    hands: tuple[HandKnot, ...]
+    utilisation: float
+    bound: float | None
+    limiting: LimitName | None
+    verified: bool
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a climb ends in the middle of a move.
+
+    Attributes
+    ----------
+    move : int
+        Number of the move, from one; zero if the start has no plan.
+    phase : str
+        Part of the move, as of `Knot`.
+    limb : str or None
+    reason : str
+        One sentence: what is missing, or which link meets what.
+    """
+
+    move: int
+    phase: KnotPhase
+    limb: str | None
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Climb:
+    """All knots of a route, up to its end or to the move that fails.
+
+    Attributes
+    ----------
+    route : Route
+    knots : tuple of Knot
+        In climbing order.
+    failure : Failure or None
+        Why the climb ends early; None if it runs from end to end.
+    """
+
+    route: Route
+    knots: tuple[Knot, ...]
+    failure: Failure | None = None

@@ -1,0 +1,238 @@
+"""Swings of a hand, sampled ten times as finely, and by coal, and those for which there is none."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from hand_models.base import InvalidInputError, Pose, turns_about
+from planner import deadline
+from planner.deadline import DeadlineError
+from planner.motion import (
+    BranchEndError,
+    CollisionScene,
+    JointSpace,
+    NoWayError,
+    check_shift,
+    check_way,
+    clear_branches,
+    pose_between,
+    shift_postures,
+    swing,
+)
+from planner.scene.solids import capsule_solids, distance_between
+from tests.suite.helpers.swings import BODY, PLACES, ROBOT, ball, palm, posture, rock, rough
+
+LIMB = "front_left"
+
+
+def goals(scene, place=(0.75, 0.35), limb=LIMB):
+    return clear_branches(scene, BODY, posture(), limb, palm(*place))
+
+
+def dense(path, count=10, step=0.02):
+    """Postures on straight lines between others, ten times as many as needed to go by steps."""
+    found = [path[:1]]
+    for first, second in pairwise(path):
+        n = count * max(1, int(np.abs(second - first).max() / step))
+        found.append(first + np.linspace(0.0, 1.0, n + 1)[1:, None] * (second - first))
+    return np.vstack(found)
+
+
+def free_space(scene, limb=LIMB):
+    others = [each for each in ROBOT.limbs if each != limb]
+    return JointSpace(scene, [BODY], posture(), (limb,), touching=others)
+
+
+def check_whole(scene, found, margin=0.02):
+    """The swing leaves straight, arrives straight, and is as clear between as it says."""
+    limb, start = found.limb, posture()[found.limb]
+    assert found.path[0] == pytest.approx(start)
+    back = [ROBOT.hand_poses({limb: each})[limb] for each in dense(found.path[: found.retreat + 1])]
+    along = [back[0].rotation.T @ (pose.position - back[0].position) for pose in back]
+    assert along[-1] == pytest.approx([0.0, 0.0, -0.05], abs=1e-9)
+    assert np.abs(np.array(along)[:, :2]).max() < 1e-3
+    on = [ROBOT.hand_poses({limb: each})[limb] for each in found.path[found.approach :]]
+    assert on[-1].rotation.T @ (on[-1].position - on[0].position) == pytest.approx(
+        [0.0, 0.0, 0.05], abs=1e-9
+    )
+    between = dense(found.path[found.retreat : found.approach + 1])
+    away = free_space(scene, limb).clearances(between).min(axis=1)
+    assert found.bound >= 0.5 * margin
+    assert away.min() >= found.bound
+    assert away.min() == pytest.approx(found.nearest.distance, abs=2e-3)
+    assert found.nearest.distance >= margin
+    assert np.abs(np.diff(found.path[: found.retreat + 1], axis=0)).max() < 0.2
+    assert np.abs(np.diff(found.path[found.approach :], axis=0)).max() < 0.2
+
+
+def by_coal(scene, joints, limb=LIMB):
+    """The least distance of a limb's capsules from all others that they are not joined with."""
+    placed, radii = scene.placed(joints), scene.radii
+    solids = capsule_solids(scene.names, placed, radii)
+    own = set(scene.own[limb].tolist())
+    return min(
+        distance_between(solids[i], solids[j])[0]
+        for i, j in scene.pairs.tolist()
+        if i in own or j in own
+    )
+
+
+@pytest.mark.parametrize("hold", [None, rough()], ids=["flat", "rough"])
+def test_a_straight_way_is_taken_where_it_is_clear(hold):
+    scene = CollisionScene(ROBOT, [rock(hold)])
+    found = swing(scene, BODY, posture(), LIMB, goals(scene))
+    assert found.how == "straight"
+    assert found.approach == found.retreat + 1
+    check_whole(scene, found)
+
+
+def test_links_keep_their_distance_by_coal():
+    scene = CollisionScene(ROBOT, [rock()])
+    found = swing(scene, BODY, posture(), LIMB, goals(scene, (0.5, 0.6)))
+    for angles in dense(found.path[found.retreat : found.approach + 1])[::20]:
+        assert by_coal(scene, {**posture(), LIMB: angles}) >= found.bound
+
+
+def blocked():
+    """Boulders on both sides of the straight way, which it meets, and the way back."""
+    scene = CollisionScene(ROBOT, [rock()])
+    straight = swing(scene, BODY, posture(), LIMB, goals(scene, (0.95, 0.25)))
+    middle = 0.5 * (straight.path[straight.retreat] + straight.path[straight.approach])
+    hand = BODY @ ROBOT.hand_poses({LIMB: middle})[LIMB]
+    place = BODY.rotation.T @ hand.position
+    return CollisionScene(ROBOT, [rock(), ball(place, 0.12)])
+
+
+def test_a_way_around_a_boulder_is_searched():
+    scene = blocked()
+    found = swing(scene, BODY, posture(), LIMB, goals(scene, (0.95, 0.25))[:1])
+    assert found.how == "searched"
+    check_whole(scene, found)
+    again = swing(scene, BODY, posture(), LIMB, goals(scene, (0.95, 0.25))[:1])
+    assert np.array_equal(again.path, found.path)
+    other = swing(scene, BODY, posture(), LIMB, goals(scene, (0.95, 0.25))[:1], seed=1)
+    check_whole(scene, other)
+
+
+def test_of_several_ends_a_later_one_may_have_the_straight_way():
+    scene = blocked()
+    ends = goals(scene, (0.95, 0.25))
+    hard = ends[0]
+    straight = [each for each in ends if is_straight(scene, each)]
+    assert not is_straight(scene, hard)
+    found = swing(scene, BODY, posture(), LIMB, [hard, *straight])
+    assert found.how == "straight"
+    assert found.path[-1] == pytest.approx(straight[0], abs=1e-9)
+
+
+def is_straight(scene, goal):
+    try:
+        return swing(scene, BODY, posture(), LIMB, [goal]).how == "straight"
+    except NoWayError:
+        return False
+
+
+def test_a_swing_without_a_way_says_which_link_meets_what():
+    """A wall of boulders across the limb's way."""
+    wall_of = [ball((0.85, y, z), 0.2) for y in (-0.1, 0.1, 0.3, 0.5, 0.7, 0.9) for z in (0.1, 0.3)]
+    scene = CollisionScene(ROBOT, [rock(), *wall_of])
+    with pytest.raises(NoWayError, match=r"^front_left has no way to its new hold: ") as caught:
+        swing(scene, BODY, posture(), LIMB, [posture()[LIMB] + [0.9, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0]])
+    assert caught.value.kind == "unreachable"
+    assert caught.value.nearest.distance < caught.value.margin
+    assert caught.value.nearest.first in str(caught.value)
+    assert caught.value.nearest.second in str(caught.value)
+
+
+def test_a_hand_that_cannot_leave_its_hold_says_so():
+    """A boulder behind its back."""
+    place = BODY.rotation.T @ palm(*PLACES[LIMB], 0.2).position
+    scene = CollisionScene(ROBOT, [rock(), ball(place, 0.16)])
+    with pytest.raises(NoWayError, match=r"beside its old hold, .* boulder"):
+        swing(scene, BODY, posture(), LIMB, [posture()[LIMB]])
+
+
+def test_no_ends_are_refused():
+    scene = CollisionScene(ROBOT, [rock()])
+    with pytest.raises(InvalidInputError, match="at least one") as caught:
+        swing(scene, BODY, posture(), LIMB, [])
+    assert caught.value.field == "goals"
+
+
+def test_a_wider_margin_is_kept_or_refused():
+    scene = CollisionScene(ROBOT, [rock()])
+    ends = goals(scene)
+    wide = swing(scene, BODY, posture(), LIMB, ends, margin=0.03)
+    check_whole(scene, wide, 0.03)
+    with pytest.raises(NoWayError, match="500 mm"):
+        swing(scene, BODY, posture(), LIMB, ends, margin=0.5)
+
+
+def test_a_deadline_ends_the_search():
+    scene = blocked()
+    ends = goals(scene, (0.95, 0.25))
+    with deadline.within(0.0), pytest.raises(DeadlineError):
+        swing(scene, BODY, posture(), LIMB, ends)
+
+
+# The body shifts ----------------------------------------------------------------------------------
+
+
+def shifted(by, turn=(0.0, 0.0, 0.0), count=6):
+    hands = {limb: BODY @ pose for limb, pose in ROBOT.hand_poses(posture()).items()}
+    there = Pose(BODY.position + np.array(by), BODY.rotation @ turns_about(turn))
+    bodies = [pose_between(BODY, there, part) for part in np.linspace(0.0, 1.0, count + 1)]
+    found = shift_postures(ROBOT, hands, bodies[1:], posture())
+    joints = {limb: np.vstack([posture()[limb], angles]) for limb, angles in found.items()}
+    return bodies, joints
+
+
+@pytest.mark.parametrize(
+    ("by", "turn"), [((0.0, 0.04, 0.05), (0.0, 0.0, 0.0)), ((0.05, 0.0, 0.0), (0.1, 0.0, 0.1))]
+)
+def test_a_shift_is_as_clear_as_it_says(by, turn):
+    scene = CollisionScene(ROBOT, [rock(rough()), ball((0.2, 0.0, 0.2))])
+    bodies, joints = shifted(by, turn)
+    seen = check_shift(scene, bodies, joints)
+    assert seen.clear
+    least = np.inf
+    for i, (first, second) in enumerate(pairwise(bodies)):
+        for part in np.linspace(0.0, 1.0, 31):
+            body = pose_between(first, second, part)
+            angles = {
+                limb: (1.0 - part) * each[i] + part * each[i + 1] for limb, each in joints.items()
+            }
+            least = min(least, scene.nearest(body, angles).distance)
+    assert seen.bound <= least <= seen.nearest.distance + 1e-9
+    assert least < seen.bound + 0.02
+
+
+def test_a_body_that_shifts_into_rock_says_so():
+    bodies, joints = shifted((0.15, 0.0, 0.0))
+    scene = CollisionScene(ROBOT, [rock(), ball((0.0, 0.0, 0.1), 0.2)])
+    seen = check_shift(scene, bodies, joints)
+    assert not seen.clear
+    assert (seen.nearest.first, seen.nearest.second) == ("body", "boulder")
+    assert str(seen.nearest).startswith("body ")
+
+
+def test_nothing_slips_between_two_postures():
+    """A ball so small that postures at both ends, and in the middle, are clear of it."""
+    scene = CollisionScene(ROBOT, [rock()])
+    found = swing(scene, BODY, posture(), LIMB, goals(scene, (0.95, 0.25)))
+    first, second = found.path[found.retreat], found.path[found.approach]
+    hand = BODY @ ROBOT.hand_poses({LIMB: first + 0.25 * (second - first)})[LIMB]
+    place = BODY.rotation.T @ hand.apply([0.0, 0.0, -0.05])
+    thin = CollisionScene(ROBOT, [rock(), ball(place, 0.002)])
+    space, line = free_space(thin), np.array([first, second])
+    assert space.clearances(np.vstack([line, line.mean(axis=0)])).min() > 0.0
+    seen = check_way(space, line, 0.0)
+    assert not seen.clear
+    assert seen.nearest.second == "boulder"
+
+
+def test_the_end_of_the_retreat_is_named_where_a_branch_ends():
+    scene = CollisionScene(ROBOT, [rock()])
+    with pytest.raises(BranchEndError, match="front_left cannot follow"):
+        swing(scene, BODY, posture(), LIMB, goals(scene), stand_off=1.5)
