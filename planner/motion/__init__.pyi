@@ -10,6 +10,7 @@ from .collisions import (
     JointSpace as JointSpace,
     Nearest as Nearest,
 )
+from .compiled_capsules import capsule_distances as capsule_distances
 from .rocks import Rock as Rock, rock_distances as rock_distances, rocks_of as rocks_of
 from .settings import MOTION_SETTINGS as MOTION_SETTINGS, MotionSettings as MotionSettings
 from .swings import (
