@@ -1,4 +1,4 @@
-"""Which placements a robot's hands reach from which poses of the body, with joint angles."""
+"""Find joint angles of limbs for many placements and poses of the body, by compiled kinematics."""
 
 import lazy_loader
 

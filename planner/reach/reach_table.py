@@ -47,7 +47,7 @@ class ReachTable:
 
     @property
     def reached(self) -> NDArray[np.bool_]:
-        """Which limbs reach which placements from which bodies, shape (P, B, L)."""
+        """True where a limb reaches a placement from a body, shape (P, B, L)."""
         found: NDArray[np.bool_] = self.entry >= 0
         return found
 

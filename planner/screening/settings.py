@@ -1,4 +1,4 @@
-"""Numbers of the screening of stances: how many directions are learnt, and its tolerances."""
+"""Numbers of the screening of stances: of directions that are learnt, and its tolerances."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["SCREENING_SETTINGS", "ScreeningSettings"]
 
 @dataclass(frozen=True, slots=True)
 class ScreeningSettings:
-    """How many directions are learnt, and tolerances of bounds."""
+    """Numbers of directions and stances, and tolerances of bounds."""
 
     directions: int = 600
     """Directions up to which bounds are learnt; further ones hardly help other stances."""

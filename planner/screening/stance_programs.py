@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import highspy
 import numpy as np
 
 from hand_models.base import Array, Indices
@@ -79,7 +78,7 @@ def solve_stance(hands: WorldHands, members: Indices, wrench: Array) -> SolvedSt
     solver.changeColCost(0, -1.0)
     if solver.optimal():
         return SolvedStance(-solver.getObjectiveValue(), _direction(solver))
-    if solver.getModelStatus() != highspy.HighsModelStatus.kInfeasible:
+    if not solver.infeasible():
         return SolvedStance(np.nan, None)
     columns = np.arange(13, dtype=np.int32)
     solver.changeColsBounds(13, columns, none[:13], free[:13])
