@@ -14,7 +14,7 @@ from hand_models.base import Array, Pose
 from planner.programs import WRENCH_UNIT
 from planner.question import EARTH_GRAVITY
 from planner.reach.limb_chain import LimbChain
-from planner.reach.reach_table import ReachTable
+from planner.reach.table import ReachTable
 from planner.robots import Robot
 
 __all__ = ["body_wrenches", "limb_moments"]
