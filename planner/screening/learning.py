@@ -69,7 +69,7 @@ def learn(
     programs : int, optional
         Most stances that are solved; all by default.
     directions : int
-        Most directions that the table is to have; further ones are used for their own stance.
+        Most directions that the table is to have: beyond, the first half and the latest are kept.
     known : ndarray, shape (N,), optional
         Load factors that are known, as in `Learnt`; by default none is.
 
@@ -106,8 +106,7 @@ def learn(
             lower, upper = table.latest(len(found)).ends(stances).T
             ends[:, 0] = np.maximum(ends[:, 0], lower)
             ends[:, 1] = np.minimum(ends[:, 1], upper)
-            if len(table.directions) > directions:
-                table = table.latest(directions)
+            table = table.trimmed(directions)
         for i, answer, bound in zip(chosen.tolist(), answers, _bounds(ends)[chosen], strict=True):
             # that nothing is held counts where the bounds prove it, whatever the solver says
             factors[i] = -np.inf if bound == -np.inf else answer.factor

@@ -88,12 +88,19 @@ class ScreeningTable:
 
     def latest(self, count: int) -> ScreeningTable:
         """Return the table with the last directions only."""
-        left = len(self.directions) - count
-        return replace(
-            self,
-            directions=self.directions[left:],
-            supports=np.ascontiguousarray(self.supports[:, left:]),
-        )
+        return self._chosen(np.arange(len(self.directions) - count, len(self.directions)))
+
+    def trimmed(self, count: int) -> ScreeningTable:
+        """Return the table with so many directions at most: the first half and the latest."""
+        if len(self.directions) <= count:
+            return self
+        left = len(self.directions) - (count - count // 2)
+        kept = np.append(np.arange(count // 2), np.arange(left, len(self.directions)))
+        return self._chosen(kept)
+
+    def _chosen(self, kept: Indices) -> ScreeningTable:
+        supports = np.ascontiguousarray(self.supports[:, kept])
+        return replace(self, directions=self.directions[kept], supports=supports)
 
     def reordered(self, stances: StanceIndices, factor: float) -> ScreeningTable:
         """Return the table with those directions first that rule out most of some stances.
@@ -119,11 +126,7 @@ class ScreeningTable:
             left &= ~ruled[:, most]
         rest = np.setdiff1d(np.arange(len(self.directions)), order)
         chosen = np.array([*order, *rest.tolist()], dtype=np.intp)
-        return replace(
-            self,
-            directions=self.directions[chosen],
-            supports=np.ascontiguousarray(self.supports[:, chosen]),
-        )
+        return self._chosen(chosen)
 
     def needed(self, stances: StanceIndices) -> Array:
         """Return the body wrenches of stances, shape (N, 6), in `WRENCH_UNIT`."""

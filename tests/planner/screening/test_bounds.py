@@ -5,10 +5,17 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 
-from hand_models.base import LimitError, wrench_transport
+from hand_models.base import LimitError, Pose, turns_about, wrench_transport
 from planner.programs import HandData, StanceData, load_factor
 from planner.programs.program import Reach
-from planner.screening import ScreeningTable, StanceIndices, learn, solve_stance
+from planner.screening import (
+    HandParts,
+    ScreeningTable,
+    StanceIndices,
+    WorldHands,
+    learn,
+    solve_stance,
+)
 from tests.suite.helpers.walls import random_wall
 
 COMS = np.array([[-0.35, 0.0, 0.0], [-0.35, 0.2, 0.1]])
@@ -153,3 +160,31 @@ def test_do_not_depend_on_the_order_of_directions_or_stances():
     with_floor = table.bounds(stances, floor)
     np.testing.assert_array_equal(with_floor[expected >= floor], expected[expected >= floor])
     assert (with_floor[expected < floor] < floor).all()
+
+
+def test_do_not_change_if_the_world_is_moved():
+    wall, stances = random_wall(10, 6), some_triples(6)
+    table = learn(tabled(wall), stances, count=3).table
+    turn = turns_about(np.array([0.4, -0.8, 1.1]))
+    moved = Pose(np.array([3.0, -1.0, 2.0]), turn)
+    parts = [HandParts.of(space) for space in wall.spaces]
+    hands = WorldHands.of(parts, [moved @ pose for pose in wall.poses], moved.position)
+    both = np.kron(np.eye(2), turn)
+    again = ScreeningTable.of(hands, table.wrenches @ both.T).extended(table.directions @ both.T)
+    again = again.latest(len(table.directions))
+    np.testing.assert_allclose(again.supports, table.supports, atol=1e-9)
+    np.testing.assert_allclose(again.bounds(stances), table.bounds(stances), rtol=1e-9)
+
+
+def test_with_few_directions_are_looser_but_valid():
+    wall, stances = random_wall(12, 7), some_triples(7)
+    whole = learn(tabled(wall), stances, count=20)
+    few = learn(tabled(wall), stances, count=20, directions=14)
+    assert len(few.table.directions) == 14 < len(whole.table.directions)
+    assert few.best == pytest.approx(whole.best, rel=1e-6)
+    # bounds of the stances themselves keep what dropped directions have shown
+    loose = few.table.bounds(stances)
+    assert (loose >= few.bounds - 1e-9).all()
+    assert (loose > few.bounds + 1e-3).any()
+    solved = np.isfinite(whole.factors)
+    assert (loose[solved] >= whole.factors[solved] - 1e-6).all()
