@@ -30,6 +30,7 @@ ROOMS = {
         "robots",
         "advice",
         "route",
+        "motion",
         "capability",
         "streaming",
         "scene",

@@ -8,10 +8,10 @@ from .branch import (
 from .collisions import (
     CollisionScene as CollisionScene,
     JointSpace as JointSpace,
-    Nearest as Nearest,
+    NearestPair as NearestPair,
 )
 from .compiled_capsules import capsule_distances as capsule_distances
-from .rocks import Rock as Rock, rock_distances as rock_distances, rocks_of as rocks_of
+from .rocks import Rock as Rock, distances_from_rock as distances_from_rock, rocks_of as rocks_of
 from .settings import MOTION_SETTINGS as MOTION_SETTINGS, MotionSettings as MotionSettings
 from .swings import (
     NoWayError as NoWayError,

@@ -91,13 +91,11 @@ class _Limb:
     def follow(self, start: Array, pose: Pose) -> Array | None:
         """Return angles near others that solve a pose; None if none are near enough."""
         target, chain, settings = self.target(pose), self.chain, MOTION_SETTINGS
-        angles, drift = start, None
-        for _ in range(settings.newton_steps):
+        angles = start
+        for k in range(settings.newton_steps):
             error, J = self.errors(angles, target)
             if np.abs(error).max() <= settings.pose_error:
                 return angles
-            if drift is None:
-                drift = self._drift(start, J)
             free = np.ones(len(angles))
             for _ in range(len(angles)):
                 step = _least_step(J * free, error)
@@ -107,9 +105,9 @@ class _Limb:
                 if not stuck.any():
                     break
                 free[stuck] = 0.0
-            # at first, as much as the joints turn anyway
-            step = step + drift * np.abs(step).max()
-            drift *= 0.0
+            if k == 0:
+                # as much as the joints turn anyway
+                step = step + self._drift(start, J) * np.abs(step).max()
             angles = np.clip(angles + step, chain.lower, chain.upper)
             if np.abs(angles - start).max() > settings.largest_step:
                 return None
@@ -179,8 +177,9 @@ def follow_poses(robot: Robot, limb: str, start_angles: Array, poses: Sequence[P
     start_angles : ndarray, shape (n,)
         Angles from which the first pose is reached by a small motion [rad].
     poses : sequence of Pose, length m
-        Poses of H in B. Between two of them the path is followed in steps so small that no joint
-        turns by more than `MotionSettings.largest_step`.
+        Poses of H in B. The path goes straight to the first and from one to the next, orientations
+        along the shortest turn, in steps so small that no joint turns by more than
+        `MotionSettings.largest_step`.
 
     Returns
     -------

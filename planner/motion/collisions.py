@@ -12,15 +12,15 @@ from hand_models.base import Array, Pose
 from planner.motion.branch import pose_between
 from planner.motion.compiled_capsules import capsule_distances
 from planner.motion.limb_capsules import LimbCapsules
-from planner.motion.rocks import Rock, rock_distances
+from planner.motion.rocks import Rock, distances_from_rock
 from planner.motion.settings import MOTION_SETTINGS
 from planner.robots import Robot
 from planner.scene import palm_capsule, unjoined_pairs
 
-__all__ = ["CollisionScene", "JointSpace", "Nearest"]
+__all__ = ["CollisionScene", "JointSpace", "NearestPair"]
 
 
-class Nearest(NamedTuple):
+class NearestPair(NamedTuple):
     """The two things that are nearest to each other.
 
     Attributes
@@ -97,7 +97,7 @@ class CollisionScene:
             found[self.own[limb]] = self.limbs[limb].segments(given)[0]
         return found
 
-    def nearest(self, body: Pose, joints: Mapping[str, Array]) -> Nearest:
+    def nearest(self, body: Pose, joints: Mapping[str, Array]) -> NearestPair:
         """Return what is nearest to each other at one posture, with all hands on their rock.
 
         A hand, with the links that its limb's last joint moves, may touch rock.
@@ -163,7 +163,7 @@ class JointSpace:
         self._measured = np.concatenate(
             [*([np.arange(len(scene.body))] if last else []), *(scene.own[limb] for limb in limbs)]
         )
-        known = np.isfinite(self._still).all(axis=(1, 2))[scene.pairs].all(axis=1)
+        known = np.asarray(np.isfinite(self._still[:, 0, 0]))[scene.pairs].all(axis=1)
         moves = np.isin(scene.pairs, np.concatenate([scene.own[limb] for limb in limbs]))
         self._pairs = np.ascontiguousarray(scene.pairs[known & moves.any(axis=1)])
         self._spread_points()
@@ -253,7 +253,7 @@ class JointSpace:
         most, gaps = far + float((radii + self._gaps).max()), self._gaps
         for i, rock in enumerate(self.scene.rocks):
             there = rock.pose.inverse().apply(points.reshape(-1, 3))
-            away = rock_distances(rock.hold, there, most).reshape(count, -1)
+            away = distances_from_rock(rock.hold, there, most).reshape(count, -1)
             near = np.minimum.reduceat(away, self._first, axis=1)
             # the place of a segment that is nearest to the rock is so far from one of its points
             inner = np.sqrt(np.maximum(near * near - gaps * gaps, 0.0))
@@ -272,11 +272,11 @@ class JointSpace:
         """Return bounds of how much the distances change by steps (S, d), shape (S, P) [m]."""
         return np.asarray(np.abs(steps) @ self._levers.T)
 
-    def nearest(self, posture: Array) -> Nearest:
+    def nearest(self, posture: Array) -> NearestPair:
         """Return what is nearest to each other at a posture, shape (d,) [rad]."""
         distances = self.clearances(posture[None])[0]
         k = int(distances.argmin())
-        return Nearest(*self._named(k), float(distances[k]))
+        return NearestPair(*self._named(k), float(distances[k]))
 
     def _named(self, column: int) -> tuple[str, str]:
         """Return the names of the two things whose distance a column has."""

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import partial
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, BoundedStore, Pose
+from hand_models.base import Array, Pose, stored
 from hand_models.hand import SettledHand
 from hand_models.rock import Hold, Mesh, TriangleCells
 from planner.question import HandOnHold
 from planner.scene import SCENE_SETTINGS, smooth_depths
 
-__all__ = ["Rock", "rock_distances", "rocks_of"]
-
-CELLS: Final[BoundedStore[Hold, TriangleCells]] = BoundedStore("rock as cells", 64)
-"""Cells of outlines, and of holds of one's own, that were asked for last."""
+__all__ = ["Rock", "distances_from_rock", "rocks_of"]
 
 
 class Rock(NamedTuple):
@@ -61,7 +57,7 @@ def rocks_of(hands: Iterable[tuple[HandOnHold, SettledHand]]) -> tuple[Rock, ...
     return tuple(found)
 
 
-def rock_distances(hold: Hold, points: Array, most: float) -> Array:
+def distances_from_rock(hold: Hold, points: Array, most: float) -> Array:
     """Return how far points are from a hold, shape (n,) [m]; negative inside.
 
     It is exact, but a lower bound for an ellipsoid.
@@ -76,10 +72,12 @@ def rock_distances(hold: Hold, points: Array, most: float) -> Array:
     """
     if hold.swept is not None:
         return np.asarray(-smooth_depths([hold.swept], points[None])[0])
-    cells = hold.cells if isinstance(hold, Mesh) else CELLS.get(hold, partial(_cells, hold))
+    cells = hold.cells if isinstance(hold, Mesh) else _cells(hold)
     return cells.distances(points, most)
 
 
+@stored("rock as cells", 64)
 def _cells(hold: Hold) -> TriangleCells:
+    """Return the cells of an outline, or of a hold of one's own; the last ones are kept."""
     far = np.full(3, SCENE_SETTINGS.rock_length)
     return TriangleCells(hold.surface(-far, far))

@@ -43,7 +43,7 @@ class MotionSettings:
     """Distance in joint space of the nodes of a search [rad]."""
     search_step: float = 0.04
     """Bound of the motion between two postures that a search looks at [m]."""
-    tries: int = 400
+    tries: int = 200
     """Directions in which a search grows, of each of its trees."""
     shortcuts: int = 40
     """Pairs of places on a way found that a straight line is tried between."""

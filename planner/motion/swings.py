@@ -14,7 +14,7 @@ import numpy as np
 
 from hand_models.base import Array, InvalidInputError, Pose
 from planner.motion.branch import BranchEndError, branches, follow_poses
-from planner.motion.collisions import CollisionScene, JointSpace, Nearest
+from planner.motion.collisions import CollisionScene, JointSpace, NearestPair
 from planner.motion.ways import Clear, check_way, search_way
 from planner.robots import Robot, scene_number
 
@@ -29,7 +29,7 @@ class NoWayError(InvalidInputError):
     limb : str
     where : str
         Part of the swing, as a clause.
-    nearest : Nearest
+    nearest : NearestPair
         What meets there.
     margin : float
         Distance that is needed [m].
@@ -42,7 +42,7 @@ class NoWayError(InvalidInputError):
 
     kind = "unreachable"
 
-    def __init__(self, limb: str, where: str, nearest: Nearest, margin: float) -> None:
+    def __init__(self, limb: str, where: str, nearest: NearestPair, margin: float) -> None:
         super().__init__(
             f"{limb} has no way to its new hold: {where}, {nearest}, and {1e3 * margin:.3g} mm "
             "are needed; shift the body, or choose another hold"
@@ -62,7 +62,7 @@ class Swing:
     retreat, approach : int
         Index of the corner at which the hand has gone back from its old hold, and from which it
         goes straight on to the new one.
-    nearest : Nearest
+    nearest : NearestPair
         The least distance that was met between those two corners.
     bound : float
         Proven lower bound of all distances between them [m].
@@ -74,7 +74,7 @@ class Swing:
     path: Array
     retreat: int
     approach: int
-    nearest: Nearest
+    nearest: NearestPair
     bound: float
     how: Literal["straight", "searched"]
 
@@ -122,9 +122,12 @@ def swing(
     DeadlineError
         If the deadline passes first.
     """
+    if not goals:
+        raise InvalidInputError("at least one is needed", field="goals")
     robot, start = scene.robot, np.asarray(joints[limb], dtype=float)
     stand_off = scene_number("motion", "stand_off") if stand_off is None else stand_off
     margin = scene_number("motion", "margin") if margin is None else margin
+    near = min(margin, scene_number("motion", "margin_at_hold"))
     others = [each for each in joints if each != limb]
     free = JointSpace(scene, [body], joints, (limb,), touching=others)
 
@@ -132,13 +135,14 @@ def swing(
         """Return joint angles, shape (m, n), with which the hand goes straight back from a hold."""
         held = JointSpace(scene, [body], {**joints, limb: angles}, (limb,), touching=robot.limbs)
         way = _straight(robot, limb, angles, stand_off)
-        _require(limb, check_way(held, way, 0.0), f"beside its {which} hold", 0.0)
+        _require(limb, check_way(held, way, near), f"beside its {which} hold", near)
         _require(limb, check_way(free, way[-1:], margin), f"in front of its {which} hold", margin)
         return way
 
     back = leaving(start, "old")
     onto: list[Array] = []
     refused: list[BranchEndError | NoWayError] = []
+    blocked: list[NearestPair] = []
     for goal in goals:
         try:
             onto.append(leaving(np.asarray(goal, dtype=float), "new")[::-1])
@@ -149,9 +153,7 @@ def swing(
         seen = check_way(free, line, margin)
         if seen.clear:
             return _joined(limb, back, line, onto[-1], seen, "straight")
-        refused.append(NoWayError(limb, "on the straight way in joint space", seen.nearest, margin))
-    if not refused:
-        raise InvalidInputError("at least one is needed", field="goals")
+        blocked.append(seen.nearest)
     if onto:
         ends = np.array([each[0] for each in onto])
         found = search_way(free, back[-1], ends, margin, seed)
@@ -159,6 +161,8 @@ def swing(
             way, seen = found
             which = int(np.abs(ends - way[-1]).max(axis=1).argmin())
             return _joined(limb, back, way, onto[which], seen, "searched")
+        where = "on the straight way in joint space, around which none was found"
+        raise NoWayError(limb, where, blocked[0], margin)
     raise refused[0]
 
 
@@ -206,8 +210,8 @@ def clear_branches(
     body : Pose
         Pose of B in W.
     joints : mapping of str to ndarray, shape (n,)
-        Joint angles of the other limbs, of which one left out is not measured; and if known those of
-        this one that the first ones are to be nearest to [rad].
+        Joint angles of the other limbs, of which one left out is not measured, and if known those
+        of this one that the first ones are to be nearest to [rad].
     limb : str
     pose : Pose
         Pose of H in W, closed on its hold.

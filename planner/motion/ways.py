@@ -13,38 +13,38 @@ import numpy as np
 
 from hand_models.base import Array
 from planner import deadline
-from planner.motion.collisions import JointSpace, Nearest
+from planner.motion.collisions import JointSpace, NearestPair
 from planner.motion.settings import MOTION_SETTINGS
 
 __all__ = ["Clear", "check_way", "search_way"]
 
 
 class Clear(NamedTuple):
-    """What was found along a way of straight lines in joint space.
+    """Least distances along a way of straight lines in joint space.
 
     Attributes
     ----------
-    nearest : Nearest
+    nearest : NearestPair
         The least distance at the postures that were looked at.
     bound : float
         Proven lower bound of all distances anywhere on the way [m]; minus infinity if it is not
         clear.
     """
 
-    nearest: Nearest
+    nearest: NearestPair
     bound: float
 
     @property
     def clear(self) -> bool:
-        """Whether the way is proven to be clear."""
+        """True if the way is proven to be clear."""
         return self.bound > -np.inf
 
 
 def check_way(space: JointSpace, postures: Array, margin: float) -> Clear:
     """Prove that straight lines between postures are clear, or find where they are not.
 
-    Intervals are halved until no distance can fall below half of the margin between two postures:
-    the distances at both, and bounds of how much they change, tell that.
+    Intervals are halved until no distance can fall below half of the least one, or of the margin,
+    between two postures, by the distances at both and bounds of how much they change.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def check_way(space: JointSpace, postures: Array, margin: float) -> Clear:
     postures : ndarray, shape (m, d)
         Joint angles of the postures [rad].
     margin : float
-        Least distance at every posture that is looked at [m].
+        Least distance at every posture that is looked at, above 0 [m].
 
     Raises
     ------
@@ -67,7 +67,7 @@ def check_way(space: JointSpace, postures: Array, margin: float) -> Clear:
         deadline.check("a limb's way was proven to be clear")
         motion = space.motions(second - first)
         proven = np.minimum(np.minimum(low, high), 0.5 * (low + high - motion)).min(axis=1)
-        open_ = proven < 0.5 * margin
+        open_ = proven < 0.5 * least
         bound = min(bound, float(proven[~open_].min(initial=np.inf)))
         if not open_.any():
             return Clear(space.nearest(worst), bound)

@@ -58,7 +58,7 @@ def check_whole(scene, found, margin=0.02):
     )
     between = dense(found.path[found.retreat : found.approach + 1])
     away = free_space(scene, limb).clearances(between).min(axis=1)
-    assert found.bound >= 0.5 * margin
+    assert found.bound >= 0.5 * found.nearest.distance
     assert away.min() >= found.bound
     assert away.min() == pytest.approx(found.nearest.distance, abs=2e-3)
     assert found.nearest.distance >= margin
@@ -115,22 +115,24 @@ def test_a_way_around_a_boulder_is_searched():
     check_whole(scene, other)
 
 
+def test_a_swing_is_the_same_wherever_the_world_begins():
+    by = Pose(np.array([2.0, -1.0, 5.0]), turns_about([0.4, 2.0, -1.0]))
+    rocks = [rock(rough()), ball((0.2, 0.9, 0.1))]
+    here = CollisionScene(ROBOT, rocks)
+    there = CollisionScene(ROBOT, [each._replace(pose=by @ each.pose) for each in rocks])
+    found = swing(here, BODY, posture(), LIMB, goals(here))
+    moved = swing(there, by @ BODY, posture(), LIMB, goals(here))
+    assert moved.path == pytest.approx(found.path, abs=1e-9)
+    assert moved.nearest[:2] == found.nearest[:2]
+    assert moved.bound == pytest.approx(found.bound, abs=1e-9)
+
+
 def test_of_several_ends_a_later_one_may_have_the_straight_way():
     scene = blocked()
-    ends = goals(scene, (0.95, 0.25))
-    hard = ends[0]
-    straight = [each for each in ends if is_straight(scene, each)]
-    assert not is_straight(scene, hard)
-    found = swing(scene, BODY, posture(), LIMB, [hard, *straight])
+    hard, easy = goals(scene, (0.95, 0.25))[0], goals(scene, (0.7, 0.75))[0]
+    found = swing(scene, BODY, posture(), LIMB, [hard, easy])
     assert found.how == "straight"
-    assert found.path[-1] == pytest.approx(straight[0], abs=1e-9)
-
-
-def is_straight(scene, goal):
-    try:
-        return swing(scene, BODY, posture(), LIMB, [goal]).how == "straight"
-    except NoWayError:
-        return False
+    assert found.path[-1] == pytest.approx(easy, abs=1e-9)
 
 
 def test_a_swing_without_a_way_says_which_link_meets_what():
@@ -205,12 +207,12 @@ def test_a_shift_is_as_clear_as_it_says(by, turn):
             }
             least = min(least, scene.nearest(body, angles).distance)
     assert seen.bound <= least <= seen.nearest.distance + 1e-9
-    assert least < seen.bound + 0.02
+    assert seen.bound >= 0.5 * least
 
 
 def test_a_body_that_shifts_into_rock_says_so():
     bodies, joints = shifted((0.15, 0.0, 0.0))
-    scene = CollisionScene(ROBOT, [rock(), ball((0.0, 0.0, 0.1), 0.2)])
+    scene = CollisionScene(ROBOT, [rock(), ball((0.0, 0.0, 0.15), 0.3)])
     seen = check_shift(scene, bodies, joints)
     assert not seen.clear
     assert (seen.nearest.first, seen.nearest.second) == ("body", "boulder")
@@ -220,14 +222,14 @@ def test_a_body_that_shifts_into_rock_says_so():
 def test_nothing_slips_between_two_postures():
     """A ball so small that postures at both ends, and in the middle, are clear of it."""
     scene = CollisionScene(ROBOT, [rock()])
-    found = swing(scene, BODY, posture(), LIMB, goals(scene, (0.95, 0.25)))
+    found = swing(scene, BODY, posture(), LIMB, goals(scene, (0.3, 0.75)))
     first, second = found.path[found.retreat], found.path[found.approach]
     hand = BODY @ ROBOT.hand_poses({LIMB: first + 0.25 * (second - first)})[LIMB]
     place = BODY.rotation.T @ hand.apply([0.0, 0.0, -0.05])
     thin = CollisionScene(ROBOT, [rock(), ball(place, 0.002)])
     space, line = free_space(thin), np.array([first, second])
     assert space.clearances(np.vstack([line, line.mean(axis=0)])).min() > 0.0
-    seen = check_way(space, line, 0.0)
+    seen = check_way(space, line, 1e-3)
     assert not seen.clear
     assert seen.nearest.second == "boulder"
 
