@@ -16,6 +16,7 @@ from hand_models.base import (
     UnsupportedError,
     wrench_transport,
 )
+from planner import deadline
 from planner.deadline import DeadlineError
 from planner.prepare import PreparedStance, prepare_stance
 from planner.programs import WRENCH_UNIT
@@ -212,6 +213,7 @@ def _prepared(questions: Sequence[Question]) -> tuple[_Hands, dict[int, str]]:
     """Return the hands of all candidates that can be planned, and what is wrong with the others."""
     known, faults = _Hands(), dict[int, str]()
     for i, question in enumerate(questions):
+        deadline.check("all candidates were prepared")
         try:
             prepared = prepare_stance(question)
             if prepared.floating:
