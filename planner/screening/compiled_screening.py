@@ -9,6 +9,40 @@ from hand_models.base import Array, Indices, compiled
 __all__ = ["load_factor_ends", "part_supports", "passing"]
 
 
+@compiled()
+def _farthest(
+    points: Array,
+    rows: Array,
+    parts: Indices,
+    first: int,
+    end: int,
+    direction: Array,
+    row: int,
+    price: float,
+    used: Array,
+) -> float:
+    """Return the largest product of a direction with a sum of parts, less the price of a row.
+
+    What the farthest vertices add to all rows is written into ``used`` (k,).
+    """
+    total = 0.0
+    used[:] = 0.0
+    for part in range(first, end):
+        most, which = -np.inf, 0
+        for i in range(parts[part], parts[part + 1]):
+            value = 0.0
+            for x in range(6):
+                value += direction[x] * points[i, x]
+            if price > 0.0:
+                value -= price * rows[i, row]
+            if value > most:
+                most, which = value, i
+        total += most
+        for k in range(len(used)):
+            used[k] += rows[which, k]
+    return total
+
+
 @compiled("f2", "f2", "i1", "i1", "f2", "f2", "f2", "f0")
 def part_supports(
     points: Array,
@@ -20,7 +54,11 @@ def part_supports(
     directions: Array,
     over: float,
 ) -> tuple[Array, Array]:
-    """Return supports (P, D) of sums of parts, and where rows of the whole hand are exceeded.
+    """Return supports (P, D) of hands, and where they are upper bounds only.
+
+    The sum of the parts is clipped exactly where one row of the whole hand alone is in the way: the
+    row's price λ ≥ 0 with the least bound, the sum's support in d − λ row plus λ times the row's
+    room, is found by the intersection of tangents.
 
     Parameters
     ----------
@@ -43,34 +81,69 @@ def part_supports(
     Returns
     -------
     supports : ndarray, shape (P, D)
-        Largest products without rows of the whole hand.
+        Supports, or upper bounds of them.
     exceeded : ndarray, shape (P, D)
-        1 where the farthest loads exceed a row, else 0.
+        1 where further rows are in the way, so that the support may be lower, else 0.
     """
     count, ways, height = len(hands) - 1, len(directions), rows.shape[1]
     supports, exceeded = np.empty((count, ways)), np.zeros((count, ways))
-    used = np.empty(height)
+    left, right, used = np.empty(height), np.empty(height), np.empty(height)
     for p in range(count):
+        first, end = hands[p], hands[p + 1]
         for d in range(ways):
-            total = 0.0
+            fixed = 0.0
             for x in range(6):
-                total += directions[d, x] * base[p, x]
-            used[:] = 0.0
-            for part in range(hands[p], hands[p + 1]):
-                most, which = -np.inf, 0
-                for i in range(parts[part], parts[part + 1]):
-                    value = 0.0
-                    for x in range(6):
-                        value += directions[d, x] * points[i, x]
-                    if value > most:
-                        most, which = value, i
-                total += most
-                for k in range(height):
-                    used[k] += rows[which, k]
-            supports[p, d] = total
+                fixed += directions[d, x] * base[p, x]
+            low = _farthest(points, rows, parts, first, end, directions[d], 0, 0.0, left)
+            supports[p, d] = fixed + low
+            row, worst = -1, 0.0
             for k in range(height):
-                if used[k] > room[p, k] + over * (1.0 + abs(room[p, k])):
-                    exceeded[p, d] = 1.0
+                excess = left[k] - room[p, k] - over * (1.0 + abs(room[p, k]))
+                if excess > worst:
+                    row, worst = k, excess
+            if row < 0:
+                continue
+            exceeded[p, d] = 1.0
+            most = room[p, row]
+            # tangents at a price that is too low and at one that is too high
+            low_price, high_price = 0.0, 1e-3
+            high = _farthest(points, rows, parts, first, end, directions[d], row, high_price, right)
+            for _ in range(40):
+                if right[row] <= most:
+                    break
+                high_price *= 2.0
+                high = _farthest(
+                    points, rows, parts, first, end, directions[d], row, high_price, right
+                )
+            if right[row] > most:
+                continue
+            value = np.inf
+            for _ in range(60):
+                down, up = most - left[row], most - right[row]
+                # each bound is its own value plus the price times the room
+                gap = (high + high_price * most) - (low + low_price * most)
+                price = (gap + down * low_price - up * high_price) / (down - up)
+                least = low + low_price * most + down * (price - low_price)
+                value = _farthest(points, rows, parts, first, end, directions[d], row, price, used)
+                value += price * most
+                if value <= least + 1e-12 * (1.0 + abs(least)):
+                    break
+                if used[row] > most:
+                    low_price, low = price, value - price * most
+                    left[:] = used
+                else:
+                    high_price, high = price, value - price * most
+                    right[:] = used
+            supports[p, d] = min(supports[p, d], fixed + value)
+            # loads between those of the two tangents reach the bound if no other row forbids it
+            share = (most - right[row]) / (left[row] - right[row])
+            held = value <= least + 1e-12 * (1.0 + abs(least))
+            for k in range(height):
+                mixed = share * left[k] + (1.0 - share) * right[k]
+                if mixed > room[p, k] + over * (1.0 + abs(room[p, k])):
+                    held = False
+            if held:
+                exceeded[p, d] = 0.0
     return supports, exceeded
 
 

@@ -183,8 +183,8 @@ class WorldHands:
     def supports(self, directions: Array) -> Array:
         """Return the support functions of all hands, shape (P, D).
 
-        Where the loads that reach farthest exceed a row of their whole hand, a linear program finds
-        the support; if its solver fails, the support without these rows stands, an upper bound.
+        Where several rows of the whole hand are in the way, a linear program finds the support; if
+        its solver fails, an upper bound stands: the support with one of these rows.
 
         Parameters
         ----------
