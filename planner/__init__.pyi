@@ -132,6 +132,7 @@ from .route import (
     plan_climb as plan_climb,
     stages as stages,
 )
+from .screening import Screened as Screened, screen as screen
 from .simulation import find_survival as find_survival
 from .solving import (
     KnownStance as KnownStance,

@@ -31,6 +31,8 @@ ROOMS = {
         "advice",
         "route",
         "motion",
+        "reach",
+        "screening",
         "capability",
         "streaming",
         "scene",

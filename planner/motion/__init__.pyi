@@ -10,6 +10,7 @@ from .collisions import (
     JointSpace as JointSpace,
     NearestPair as NearestPair,
 )
+from .compiled_capsules import capsule_distances as capsule_distances
 from .rocks import Rock as Rock, distances_from_rock as distances_from_rock, rocks_of as rocks_of
 from .settings import MOTION_SETTINGS as MOTION_SETTINGS, MotionSettings as MotionSettings
 from .swings import (

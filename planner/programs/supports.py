@@ -35,6 +35,10 @@ class SilentHighs(highspy.Highs):
         self.run()
         return bool(self.getModelStatus() == highspy.HighsModelStatus.kOptimal)
 
+    def infeasible(self) -> bool:
+        """Return True if HiGHS reported after the last `optimal` that no solution is feasible."""
+        return bool(self.getModelStatus() == highspy.HighsModelStatus.kInfeasible)
+
     def enableCallbacks(self) -> None:
         """Switch the output of HiGHS off. HiGHS calls this method before it prints its banner."""
         self.silent()

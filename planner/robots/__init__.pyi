@@ -18,3 +18,4 @@ from .robot import (
     robot_of as robot_of,
 )
 from .robot_file import RobotFile as RobotFile
+from .tolerances import TOLERANCES as TOLERANCES

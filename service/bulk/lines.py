@@ -36,6 +36,8 @@ class Lines:
     ----------
     source : str
         Path of the file, or ``-`` for standard input, which is copied to a temporary file.
+    field : str, optional
+        Name of the source in errors.
 
     Attributes
     ----------
@@ -48,7 +50,7 @@ class Lines:
         If the file cannot be read.
     """
 
-    def __init__(self, source: str) -> None:
+    def __init__(self, source: str, field: str = "REQUESTS") -> None:
         try:
             if source == "-":
                 self._file: BinaryIO = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `close`
@@ -57,7 +59,7 @@ class Lines:
                 self._file = Path(source).open("rb")  # noqa: SIM115
             self.count = sum(1 for _ in self)
         except OSError as error:
-            raise InvalidInputError(f"{error.strerror}: {source}", field="REQUESTS") from None
+            raise InvalidInputError(f"{error.strerror}: {source}", field=field) from None
 
     def __iter__(self) -> Iterator[bytes]:
         return (line for _, line in self.numbered())

@@ -79,6 +79,10 @@ COMMANDS_BY_NAME: Final = {
         "Evaluate climbs: every stance, and every one with a limb in the air.",
     ),
     "schema": Entry("network", "Print the JSON Schema of every message."),
+    "screen": Entry(
+        "spaces",
+        "Rank stances by their load factors; solve only those that may be the best.",
+    ),
     "serve": Entry(
         "network",
         "Answer questions on zenoh until SIGTERM or Ctrl-C.",

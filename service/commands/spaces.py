@@ -1,4 +1,4 @@
-"""Define ``crux wrench-space`` for one hand, and ``crux body-space`` for the whole body."""
+"""Define ``crux wrench-space`` of one hand, ``crux body-space``, and ``crux screen`` of stances."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import msgspec
 from click.core import ParameterSource
 
 import planner
+from hand_models.base import InvalidInputError
 from hand_models.opening import opening_path
 from service import answering, replies, requests, tables
 from service.commands import options, stances
@@ -17,7 +18,7 @@ from service.commands import options, stances
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
 
-__all__ = ["body_space_command", "wrench_space_command"]
+__all__ = ["body_space_command", "screen_command", "wrench_space_command"]
 
 
 @click.command("wrench-space")
@@ -207,3 +208,57 @@ def body_space_command(
     falls = accelerations > 0 and (found.solid is None or found.solid.margin < 0.0)
     status = tables.ExitStatus.of(found.reply.status)
     return tables.ExitStatus.OVERLOADED if falls and status == tables.ExitStatus.DONE else status
+
+
+@click.command("screen")
+@click.argument("candidates")
+@click.option(
+    "--best",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    metavar="N",
+    help="Plan the best N, and prove that no other is better.",
+)
+@click.option(
+    "--within",
+    type=options.FiniteRange(0.0, 1.0, max_open=True),
+    default=0.0,
+    metavar="PART",
+    help="Plan also all whose load factor may be within this part of the best, as 0.05.",
+)
+@options.own_options
+@options.json_option
+def screen_command(
+    candidates: str, best: int, within: float, own: options.Own, as_json: bool
+) -> int:
+    """Rank stances by their load factors; solve only those that may be the best.
+
+    CANDIDATES is the path of a file of JSON lines as crux batch takes it, - for standard input, or
+    a folder: all files in it that end in .json or .toml. Hands have fixed wrists. Supports of the
+    hands bound all load factors from above; programs are solved only of stances whose bound is
+    above the best ones known.
+
+    Exit status: 0 if a stance has a load factor, 3 if none has, 2 if none can be read.
+    """
+    names, questions, wrong = [], [], dict[str, str]()
+    first: InvalidInputError | None = None
+    for name, request in stances.read_candidates(candidates):
+        try:
+            if isinstance(request, InvalidInputError):
+                raise request
+            questions.append(answering.question(own.asked(request), own.robots))
+            names.append(name)
+        except InvalidInputError as error:
+            first, wrong[name] = first or error, str(error)
+    if first is not None and not names:
+        raise InvalidInputError(f"{next(iter(wrong))}: {first.message}", field=first.field)
+    with tables.working(f"screening {len(names)} stances"):
+        found = planner.screen(questions, best=best, within=within)
+    wrong |= {names[i]: fault for i, fault in found.faults.items()}
+    if as_json:
+        tables.say(tables.screening_json(found, names, wrong))
+    else:
+        tables.print_screening(found, names, tables.console())
+        tables.note_faults(wrong)
+    return tables.ExitStatus.DONE if len(found.best) else tables.ExitStatus.OVERLOADED

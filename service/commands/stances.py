@@ -9,6 +9,8 @@ from __future__ import annotations
 import sys
 import tomllib
 from codecs import BOM_UTF8
+from collections.abc import Callable, Iterator
+from contextlib import closing
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -17,12 +19,13 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import msgspec
 
 from hand_models.base import InvalidInputError
-from service import answering, requests, wire
+from service import answering, bulk, requests, wire
 
 __all__ = [
     "Given",
     "bundled",
     "limbs_of",
+    "read_candidates",
     "read_request",
     "read_route",
     "read_route_with_text",
@@ -168,6 +171,60 @@ def _has_moves(text: bytes, name: str) -> bool:
     except (wire.MalformedError, msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         return False
     return isinstance(content, dict) and "moves" in content
+
+
+def read_candidates(source: str) -> Iterator[tuple[str, requests.PlanRequest | InvalidInputError]]:
+    """Yield the plan requests of a file of JSON lines, or of a folder of stance files.
+
+    Parameters
+    ----------
+    source : str
+        Path of a file of JSON lines, ``-`` for standard input, or the path of a folder, whose files
+        that end in .json or .toml are read in the order of their names.
+
+    Yields
+    ------
+    name : str
+        ``line`` and its number, or the name of the file.
+    request : PlanRequest or InvalidInputError
+        The request with its meshes, or what is wrong with it.
+
+    Raises
+    ------
+    InvalidInputError
+        If the source cannot be read, or has no requests.
+    """
+    path, found = Path(source), False
+    if path.is_dir():
+        for each in sorted(path.iterdir()):
+            if each.suffix.lower() in (".json", ".toml"):
+                found = True
+                yield each.name, _or_error(read_request, str(each))
+    else:
+        files = answering.MeshFiles(Path() if source == "-" else path.parent)
+        with closing(bulk.Lines(source, "CANDIDATES")) as lines:
+            for number, line in lines.numbered():
+                found = True
+                yield f"line {number}", _or_error(_whole, line, files)
+    if not found:
+        raise InvalidInputError(
+            f"{source}: has no stances; give lines of JSON, or files .json or .toml",
+            field="CANDIDATES",
+        )
+
+
+def _whole(line: bytes, files: answering.MeshFiles) -> requests.PlanRequest:
+    return files.whole(wire.decode_request(line, requests.PlanRequest))
+
+
+def _or_error(
+    read: Callable[..., requests.PlanRequest], *given: Any
+) -> requests.PlanRequest | InvalidInputError:
+    """Return a request that is read, or the error of reading it."""
+    try:
+        return read(*given)
+    except InvalidInputError as error:
+        return error
 
 
 def limbs_of(source: str | None) -> tuple[str, ...]:

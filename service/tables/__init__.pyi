@@ -35,6 +35,11 @@ from .openings import print_opening as print_opening
 from .output_lock import write_alone as write_alone
 from .plans import print_plan as print_plan, print_route as print_route
 from .redundancy import print_redundancy as print_redundancy
+from .screening import (
+    note_faults as note_faults,
+    print_screening as print_screening,
+    screening_json as screening_json,
+)
 from .sweeps import print_sweep as print_sweep
 from .terminal import (
     filling_folder as filling_folder,

@@ -74,7 +74,7 @@ def test_bash_offers_the_names(words, names, tmp_path):
 
 def test_names_of_commands_routes_and_studies_are_completed():
     assert completed("") == sorted(COMMANDS_BY_NAME)
-    assert completed("s") == ["schema", "serve", "simulate", "stream", "study", "sweep"]
+    assert completed("s") == ["schema", "screen", "serve", "simulate", "stream", "study", "sweep"]
     assert completed("route", "") == list(bundled(RouteRequest))
     assert completed("study", "fig1") == [name for name in STUDY_NAMES if name.startswith("fig1")]
 

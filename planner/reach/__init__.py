@@ -1,0 +1,5 @@
+"""Find joint angles of limbs for many placements and poses of the body, by compiled kinematics."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,238 @@
+"""The reach table: joint angles of every limb for every placement and pose of the body."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hand_models.base import Array, Indices, Pose, go_on, stored
+from planner import deadline
+from planner.motion import CollisionScene
+from planner.reach.limb_chain import LimbChain
+from planner.reach.settings import REACH_SETTINGS
+from planner.reach.starts import Starts
+from planner.robots import Robot
+
+__all__ = ["ReachTable", "reach_poses", "reach_table"]
+
+Fits = Callable[[Array], NDArray[np.bool_]]
+"""Says which of some joint angles (S, n) are wanted, (S,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReachTable:
+    """Joint angles with which limbs reach placements from poses of the body, as plain arrays.
+
+    Attributes
+    ----------
+    entry : ndarray of int, shape (P, B, L)
+        Index of each placement, body and limb among the E that are reached; −1 where no joint
+        angles were found, which proves nothing where the placement is within the limb's span.
+    spanned : ndarray of bool, shape (P, B, L)
+        False where the placement is farther than the stretched limb: no angles can reach it.
+    starts : ndarray of int, shape (E + 1,)
+        Index of the first solution of each entry.
+    angles : ndarray, shape (A, n)
+        Joint angles of all solutions [rad]; zero beyond the last joint of a limb of fewer joints.
+    """
+
+    entry: Indices
+    spanned: NDArray[np.bool_]
+    starts: Indices
+    angles: Array
+
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """True where a limb reaches a placement from a body, shape (P, B, L)."""
+        found: NDArray[np.bool_] = self.entry >= 0
+        return found
+
+    def branches(self, placement: int, body: int, limb: int) -> Array:
+        """Return the solutions of one limb, shape (a, n) [rad]; a = 0 if none was found."""
+        at = int(self.entry[placement, body, limb])
+        return self.angles[:0] if at < 0 else self.angles[self.starts[at] : self.starts[at + 1]]
+
+
+def reach_poses(
+    chain: LimbChain,
+    starts: Starts,
+    targets: Array,
+    branches: int = REACH_SETTINGS.branches,
+    fits: Fits | None = None,
+) -> tuple[Array, Indices]:
+    """Return joint angles of a limb for many poses of its hand.
+
+    Damped least squares start from random postures whose hands are near each pose: from a few, and
+    from more for poses of which these find no solution that fits. Only the span of the limb leaves
+    out poses that are not tried.
+
+    Parameters
+    ----------
+    chain : LimbChain
+    starts : Starts
+        Random postures of the same limb.
+    targets : ndarray, shape (N, 3, 4)
+        Axes and origins of the poses of H in B.
+    branches : int
+        Most solutions of a pose; two of them differ by more than `ReachSettings.alike` in a joint.
+    fits : callable, optional
+        Says which joint angles (S, n) may be returned, (S,); all by default.
+
+    Returns
+    -------
+    angles : ndarray, shape (A, n)
+        Joint angles within their limits, pose by pose [rad].
+    count : ndarray of int, shape (N,)
+        Number of solutions of each pose.
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline passes first.
+    """
+    from planner.reach.compiled_kinematics import solve_poses
+
+    settings = REACH_SETTINGS
+    numbers = np.array(
+        [
+            settings.pose_error,
+            settings.damping,
+            settings.least_damping,
+            settings.longest_step,
+            settings.alike,
+            settings.early_steps,
+        ]
+    )
+    count = np.zeros(len(targets), dtype=np.intp)
+    kept, whose = list[Array](), list[Indices]()
+    left = np.flatnonzero(chain.spans(targets) <= 1.0 + settings.pose_error)
+    ends = (0, settings.starts, settings.starts + settings.more_starts)
+    for first, end in pairwise(ends):
+        # where none of the first ones fits, others may
+        most = branches if first == 0 or fits is None else end - first
+        for at in range(0, len(left), settings.at_once):
+            deadline.check("the reach of all limbs was known")
+            go_on()
+            some = left[at : at + settings.at_once]
+            asked = np.ascontiguousarray(targets[some])
+            near = starts.near(asked, first, end)
+            angles, found = solve_poses(
+                *chain[:9], chain.reach, asked, near, numbers, settings.steps, most
+            )
+            solved = np.arange(most) < found[:, None]
+            owners, flat = np.repeat(some, found), angles[solved]
+            if fits is not None and len(flat):
+                good = fits(flat)
+                owners, flat = owners[good], flat[good]
+            if most > branches:
+                # the first ones of each pose
+                rank = np.arange(len(owners)) - np.searchsorted(owners, owners)
+                owners, flat = owners[rank < branches], flat[rank < branches]
+            kept.append(flat)
+            whose.append(owners)
+            count += np.bincount(owners, minlength=len(targets))
+        left = left[count[left] == 0]
+    if not kept:
+        return np.zeros((0, len(chain.lower))), count
+    order = np.argsort(np.concatenate(whose), kind="stable")
+    return np.concatenate(kept)[order], count
+
+
+def reach_table(
+    robot: Robot,
+    placements: Sequence[Pose],
+    bodies: Sequence[Pose],
+    *,
+    branches: int = REACH_SETTINGS.branches,
+    limbs: Sequence[str] | None = None,
+    clear: bool = True,
+) -> ReachTable:
+    """Return which placements a robot's hands reach from which poses of its body.
+
+    Rock and the other limbs are not looked at.
+
+    Parameters
+    ----------
+    robot : Robot
+    placements : sequence of Pose, length P
+        Poses of H in the world frame W.
+    bodies : sequence of Pose, length B
+        Poses of B in W.
+    branches : int
+        Most solutions that are kept for each.
+    limbs : sequence of str, optional
+        Limbs of the table, in its order; all by default.
+    clear : bool
+        Whether solutions are left out in which the capsules of a limb and its hand meet those of
+        the body, or each other.
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline passes first.
+    """
+    names = robot.limbs if limbs is None else tuple(limbs)
+    targets = _poses_in_bodies(placements, bodies)
+    shape = len(placements), len(bodies), len(names)
+    counts, spanned = np.zeros(shape, dtype=np.intp), np.zeros(shape, dtype=bool)
+    found, most = list[Array](), max(len(robot.chains[limb].joints) for limb in names)
+    scene = CollisionScene(robot, ())
+    for i, limb in enumerate(names):
+        chain, starts = _limb_postures(robot, limb)
+        fits = _clear_of_itself(scene, limb) if clear else None
+        angles, count = reach_poses(chain, starts, targets, branches, fits)
+        found.append(np.pad(angles, ((0, 0), (0, most - angles.shape[1]))))
+        counts[:, :, i] = count.reshape(shape[:2])
+        spanned[:, :, i] = (chain.spans(targets) <= 1.0 + REACH_SETTINGS.pose_error).reshape(
+            shape[:2]
+        )
+    # entries limb by limb, then by placement and body
+    flat = np.moveaxis(counts, 2, 0)
+    entry = np.full(flat.shape, -1, dtype=np.intp)
+    entry[flat > 0] = np.arange(int((flat > 0).sum()))
+    return ReachTable(
+        entry=np.ascontiguousarray(np.moveaxis(entry, 0, 2)),
+        spanned=spanned,
+        starts=np.cumsum(np.append(0, flat[flat > 0])),
+        angles=np.concatenate(found),
+    )
+
+
+@stored("starts of limbs", 32)
+def _limb_postures(robot: Robot, limb: str) -> tuple[LimbChain, Starts]:
+    """Return a limb's constants and its random postures."""
+    chain = LimbChain.of(robot, limb)
+    return chain, Starts(chain)
+
+
+def _poses_in_bodies(placements: Sequence[Pose], bodies: Sequence[Pose]) -> Array:
+    """Return axes and origins (P B, 3, 4) in B of all placements from all bodies."""
+    turns = np.array([each.rotation for each in placements]).reshape(-1, 1, 3, 3)
+    places = np.array([each.position for each in placements]).reshape(-1, 1, 3)
+    axes = np.array([each.rotation for each in bodies]).reshape(1, -1, 3, 3)
+    origins = np.array([each.position for each in bodies]).reshape(1, -1, 3)
+    inverse = axes.swapaxes(2, 3)
+    moved = inverse @ (places - origins)[..., None]
+    return np.ascontiguousarray(np.concatenate([inverse @ turns, moved], axis=3)).reshape(-1, 3, 4)
+
+
+def _clear_of_itself(scene: CollisionScene, limb: str) -> Fits:
+    """Return a function that says which joint angles of a limb keep it off the body and itself."""
+    from planner.motion import capsule_distances
+
+    mine = np.append(np.arange(len(scene.body)), scene.own[limb])
+    within = np.isin(scene.pairs, mine).all(axis=1) & np.isin(scene.pairs, scene.own[limb]).any(1)
+    pairs = np.searchsorted(mine, scene.pairs[within])
+    radii, capsules = scene.radii[mine], scene.limbs[limb]
+
+    def fits(angles: Array) -> NDArray[np.bool_]:
+        body = np.broadcast_to(scene.body, (len(angles), *scene.body.shape))
+        segments = np.ascontiguousarray(np.hstack([body, capsules.segments(angles)]))
+        away = capsule_distances(segments, radii, pairs, 0.0)
+        return np.asarray(away.min(axis=1, initial=0.0) >= 0.0)
+
+    return fits
