@@ -1,4 +1,4 @@
-"""How a closed hand opens, and how an open hand closes: wrenches on the way, as few knots."""
+"""Paths of a hand that opens or closes: its wrench on the way, as few knots; its retreat."""
 
 import lazy_loader
 

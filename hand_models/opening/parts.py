@@ -1,4 +1,4 @@
-"""What the tiles of a hand do to the rock while its tendons let go, or tighten, part by part.
+"""Parts of a hand's wrench on the rock while its tendons let go, or tighten.
 
 - The phalanges of a finger are those of its `FingerPath`.
 - A tile on a finger's base is dragged by the tendon as the others are; it is not pressed, so it
@@ -43,7 +43,7 @@ PATH_SETTINGS: Final = PathSettings()
 
 
 class Part(NamedTuple):
-    """What some tiles of one finger do to the rock, over the path parameter s.
+    """Wrench of some tiles of one finger on the rock, over the path parameter s.
 
     s is the tension on a closing path, and how far it has been lowered on an opening path [N].
 

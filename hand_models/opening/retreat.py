@@ -1,4 +1,4 @@
-"""How far an opened hand backs off until its straight fingers are clear of the rock."""
+"""Retreat of an opened hand until its straight fingers are clear of the rock."""
 
 from __future__ import annotations
 

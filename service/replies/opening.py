@@ -54,7 +54,7 @@ class JamReply(Struct, kw_only=True):
 
 
 class OpeningReply(Struct, kw_only=True):
-    """How a closed hand opens: all tendons are lowered from the closing tension to zero.
+    """Opening of a closed hand: all tendons are lowered from the closing tension to zero.
 
     - ``knots``: between neighbours all numbers are linear in the tension, to ``deviation``; two
       knots at one tension are before and after a finger snaps.
