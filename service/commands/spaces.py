@@ -11,7 +11,6 @@ from click.core import ParameterSource
 
 import planner
 from hand_models.base import InvalidInputError
-from hand_models.opening import opening_path
 from service import answering, replies, requests, tables
 from service.commands import options, stances
 
@@ -69,6 +68,8 @@ def wrench_space_command(
         with tables.progress(f"{per_axis}^6 poses of {limb}") as report:
             found = planner.survey(wrist, per_axis, report)
     if picture is not None and opening:
+        from hand_models.opening import opening_path
+
         settled, _ = planner.hand_space(answering.stance(request.stance, robots), limb)
         with tables.writing(picture):
             planner.plot_opening(opening_path(settled), picture, f"{limb} of {stance}")
