@@ -78,10 +78,11 @@ def plan_climb(
         If a wrist is not fixed, the body accelerates about an axis, or a move gives joint angles of
         a limb that stays.
     """
+    solved = route
     if route.start.joints is None:
-        route = replace(route, start=replace(route.start, joints="solve"))
-    refuse(route)
-    planner, failure = _Planner(route, (settings or ClimbSettings()).complete()), None
+        solved = replace(route, start=replace(route.start, joints="solve"))
+    refuse(solved)
+    planner, failure = _Planner(solved, (settings or ClimbSettings()).complete()), None
     try:
         planner.begin()
         for number, move in enumerate(route.moves, start=1):

@@ -37,7 +37,7 @@ def evaluate(
     progress : callable, optional
         Called after each stage with (number of stages planned, number of stages).
     climb : Climb, optional
-        Knots of the same route: a stage that has a knot is planned with that knot's joint angles.
+        Knots of the same route: stages are planned with its `Climb.stage_joints`.
 
     Returns
     -------
@@ -50,7 +50,7 @@ def evaluate(
     InvalidInputError
         If a stance is not valid, or a move ends without contact; the field names the move.
     """
-    found_joints = {} if climb is None else {k.stage: k.joints for k in climb.knots}
+    found_joints = {} if climb is None else climb.stage_joints
     todo = tuple(_in_posture(each, found_joints.get(each.index)) for each in stages(route))
     if workers is None:
         # fewer stages are planned faster here than in processes that must first start

@@ -140,3 +140,19 @@ class Climb:
     route: Route
     knots: tuple[Knot, ...]
     failure: Failure | None = None
+
+    @property
+    def fails(self) -> bool:
+        """True if the climb ends early although the route asks for joints."""
+        return self.failure is not None and self.route.start.joints is not None
+
+    @property
+    def stage_joints(self) -> Mapping[int, Mapping[str, Array]]:
+        """Joint angles of the stages that have a knot, by index of the stage.
+
+        There are none of a climb that ends early if the route does not ask for joints: then all its
+        stages are planned without.
+        """
+        if self.failure is not None and not self.fails:
+            return {}
+        return {knot.stage: knot.joints for knot in self.knots if knot.stage is not None}

@@ -163,9 +163,9 @@ def _one(
         tables.print_route(result, files, tables.console(), climb)
         if knots and "trajectory table" not in files:
             tables.remark(f"for the trajectory as a table: {to_install('parquet')}")
-    failed = climb is not None and climb.failure is not None
     status = tables.ExitStatus.of(result.status)
-    return tables.ExitStatus.OVERLOADED if failed and status == tables.ExitStatus.DONE else status
+    fails = climb is not None and climb.fails
+    return tables.ExitStatus.OVERLOADED if fails and status == tables.ExitStatus.DONE else status
 
 
 def _climb(
@@ -211,8 +211,7 @@ def _stage(asked: _Asked, index: int, file: Path | None, own: options.Own, as_js
     # later moves have a say in the joint angles, so that they can be kept
     with tables.working(f"planning the moves of {route.name}"):
         climb = _climb(route)
-    knots = () if climb is None else climb.knots
-    joints = next((knot.joints for knot in knots if knot.stage == index), None)
+    joints = None if climb is None else climb.stage_joints.get(index)
     request = options.with_extras(asked.stage(stage, joints), whole=not as_json)
     answer = answering.planned(request, own.robots)
     if file is not None:

@@ -349,6 +349,11 @@ def print_route(
     summary = planner.summary(result, climb)
     if climb is not None:
         _print_moves(summary["climb"], out)
+        if climb.failure is not None and not climb.fails:
+            out.print(
+                'The route has no joints, and its stages are planned without; with "joints": "solve"'
+                " in its stance they are planned with those of the climb."
+            )
     print_warnings(summary["warnings"], out)
     out.print(summary["crux"]["sentence"])
     for what, path in files.items():
@@ -370,7 +375,7 @@ def _print_moves(climb: Mapping[str, Any], out: Console) -> None:
         number("bound", "bound", ".2f"),
         text("limited by", limit),
     )
-    title = f"moves: {climb['knots']} knots in {climb['time']:.1f} s"
+    title = f"moves: {climb['knots']} knots, {climb['time']:.1f} s long"
     print_rows(climb["moves"], columns, out, title)
     if (failure := climb["failure"]) is not None:
         what = f"move {failure['move']} fails ({failure['phase']})"
