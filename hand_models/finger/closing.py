@@ -149,13 +149,17 @@ def _followed(
     after, there, trial = state.copy(), around.copy(), state.copy()
     now = np.zeros(1, LINEARISED_FIELDS)
     fixed = (SETTINGS_RECORD, CODE_RECORD, shape, drive)
-    depth, slow = drive["depth"][0], 0
+    depth, slow, still = drive["depth"][0], 0, 0
     most = 0.1 * SETTINGS.most_damping * drive["torque"][0]
     for step in range(SETTINGS.most_increments):
         go_on()
         balance = SETTINGS.balance if step <= SETTINGS.long_path else SETTINGS.late_balance
         least = _begun(SETTINGS_RECORD, CODE_RECORD, state, around, trial)
         contact_states(*fixed, trial, around, least, now)
+        if drive["lowers"][0]:
+            # one that moves to and fro at a tension goes on without a balance there
+            still = still + 1 if after["s"][0] == state["s"][0] else 0
+            drive["lowers"] = 2 if still > SETTINGS.patience else 1
         rests = _increment(*fixed, state, around, now, balance, after)
         slow = slow + 1 if after["damping"][0] > most else 0
         if rests or slow > SETTINGS.patience:
@@ -255,8 +259,7 @@ def _increment(
         before = max(before, abs(state.step[i]))
     turns_back = along < -0.3 * square and size > 100.0 * settings.still_turn and not waits
     # as far as the joints may turn, whose arms are of one, two and three phalanges
-    air = not now.active.any()
-    most = settings.most_stride
+    air, most = not now.active.any(), settings.most_stride
     if air:
         clear = around.gap.min() / (0.5 * JOINT_COUNT * (JOINT_COUNT + 1) * shape.end)
         most = max(clear, settings.first_stride)
@@ -266,8 +269,7 @@ def _increment(
     more = min(target - state.s, step * drive.closing)
     fastest = max(np.abs(grow).max(), settings.rounding)
     more = min(more, max(most - size, 0.0) / fastest)
-    opens = False
-    forced = np.inf
+    opens, forced = False, np.inf
     for j in range(JOINT_COUNT):
         caught, mode = _caught(settings, state, around, j), now.mode[j]
         # the least gap is that of the path, not of joints that are on their way back to it
@@ -301,7 +303,7 @@ def _increment(
     more = min(more, max(forced, settings.least_tension * drive.closing))
     # where a gap begins to grow, its least is to be that of the path, not of an increment beside it
     beside = size > settings.path_turn and opens and not air
-    if drive.lowers:
+    if drive.lowers == 1:
         # from balance to balance
         beside |= max(state.unbalanced, state.damping * size) > settings.balanced * drive.torque
     if waits or turns_back or beside or size > most or now.clear < 1.0:
@@ -383,12 +385,11 @@ def _judged(
             state.damping = _grows(settings, drive, after.damping, 0.5 * settings.damping)
         state.stride = max(0.3 * moved, settings.least_stride)
         return float(np.inf)
-    for j in range(JOINT_COUNT):
-        # spines of a finger that opens catch nothing anew
-        if drive.lowers:
-            if most <= settings.balanced * drive.torque:
-                after.most[j] = min(after.most[j], there.share[j])
-            after.off[j] = max(there.share[j] - after.most[j], 0.0)
+    # spines of a finger that opens catch nothing anew
+    for j in range(JOINT_COUNT if drive.lowers else 0):
+        if most <= settings.balanced * drive.torque:
+            after.most[j] = min(after.most[j], there.share[j])
+        after.off[j] = max(there.share[j] - after.most[j], 0.0)
     after.unbalanced = most
     growth = 2.0 if wrong < settings.exact_torque * drive.torque else 1.3
     after.stride = min(growth * after.stride, settings.most_stride)

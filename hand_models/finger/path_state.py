@@ -71,9 +71,10 @@ M τ, the shear of each tile per newton of tension while it closes; M g, the sam
 ``depth``: depth to which the closing tension presses tiles into their beds of springs [m].
 ``closing``: closing tension [N]; ``end``: path parameter s at the end of the path [N]; ``torque``:
 the tendon's torque about the proximal joint at the closing tension [N·m]. ``limits``: strength of
-the surface, f_max [N], f_min [N], φ_max [rad], exponent p and friction μ. ``lowers``: whether the
-tension is lowered from the closing tension. ``stiffness``, ``preload``, ``lower``, ``upper``:
-spring stiffness [N·m/rad], spring preload [N·m] and angle limits [rad] of the joints.
+the surface, f_max [N], f_min [N], φ_max [rad], exponent p and friction μ. ``lowers``: 1 where the
+tension is lowered from the closing tension, 2 where it goes on without balance, else 0.
+``stiffness``, ``preload``, ``lower``, ``upper``: spring stiffness [N·m/rad], spring preload [N·m]
+and angle limits [rad] of the joints.
 """
 
 AROUND_FIELDS: Final = np.dtype(

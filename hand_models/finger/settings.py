@@ -70,7 +70,8 @@ class FingerSettings:
     """Damping above which joints count as slow."""
     patience: int = 100
     """Number of increments in a row with more than a tenth of the largest damping after which a
-    finger counts as without rest; fingers that rest took 28 at most on 2,000 rough surfaces."""
+    finger counts as without rest; fingers that rest took 28 at most on 2,000 rough surfaces. Also
+    the number at one tension after which a finger that opens goes on without balance."""
     exact_torque: float = 0.003
     path_torque: float = 0.03
     damped_torque: float = 0.3
