@@ -233,17 +233,12 @@ def _strips(scale: Scale, heights: Heights, section: PolylineSection | None) -> 
     """Return how far the rock of each strip under a finger's tiles lies behind their envelope."""
     if section is None:
         return NO_STRIPS
-    places = np.concatenate(section.pieces)
-    s = scale.places
-    at = np.clip(((places[:, 0] - s[0]) / (s[1] - s[0])).astype(np.intp), 0, len(s) - 2)
-    part = (places[:, 0] - s[at]) / (s[1] - s[0])
-    with np.errstate(invalid="ignore"):
-        depths = heights.lines - heights.tile
-        depths = depths[:, at] + part * (depths[:, at + 1] - depths[:, at])
-    along, into = np.concatenate([np.gradient(curve, axis=0) for curve in section.pieces]).T
-    upright = np.maximum(along / np.hypot(along, into), BASE_TOLERANCES.angle)
-    behind = np.where(np.isfinite(depths), np.maximum(depths, 0.0) * upright, np.inf)
-    return RockStrips(scale.lines, places[:, 0] + 1j * places[:, 1], behind.T)
+    from hand_models.rock.compiled_heights import depths_behind
+
+    points, stops = strung(section.pieces)
+    least = BASE_TOLERANCES.angle
+    behind = depths_behind(points, stops, scale.places, heights.tile, heights.lines, least)
+    return RockStrips(scale.lines, points.view(complex)[:, 0], behind)
 
 
 class OutlinedHold(Hold):

@@ -1,4 +1,4 @@
-"""Search the polylines that bound rock: nearest segments, and the highest place (compiled).
+"""Search and sample polylines that bound rock: nearest segments, highest places (compiled).
 
 Several polylines are an array of their points, one after another, and the index at which each ends.
 Segments are counted through all of them.
@@ -6,13 +6,15 @@ Segments are counted through all of them.
 
 from __future__ import annotations
 
+import cmath
 import math
 
 import numpy as np
 
 from hand_models.base import Array, Indices, compiled
+from hand_models.sections.section import Complexes
 
-__all__ = ["highest_rock", "nearest_segments"]
+__all__ = ["equal_parts", "highest_rock", "nearest_segments"]
 
 
 @compiled()
@@ -89,3 +91,53 @@ def highest_rock(vertices: Array, ends: Indices, low: Array, high: Array) -> Arr
                         least[i] = min(least[i], t + part * (t_after - t))
             begin = end
     return least
+
+
+@compiled("c1", "f0", "f0", "f0")
+def equal_parts(
+    chain: Complexes, reach: float, spacing: float, relative: float
+) -> tuple[Complexes, Array]:
+    """Return places on a curve, at its corners and in equal steps between, and their lengths [m].
+
+    Parameters
+    ----------
+    chain : ndarray of complex, shape (n,)
+        Points s + i t of the curve [m].
+    reach : float
+        Distance from the origin beyond which the curve is left out [m].
+    spacing : float
+        Largest step [m].
+    relative : float
+        Part of a step by which steps may be too long by rounding.
+    """
+    count = len(chain) - 1
+    at, near, step = np.zeros(count + 1), np.zeros(count + 1, np.bool_), np.diff(chain)
+    for i in range(count):
+        size = abs(step[i])
+        at[i + 1] = at[i] + size
+        part = -(chain[i] * step[i].conjugate()).real / max(size * size, 1e-24)
+        near[i] = abs(chain[i] + min(max(part, 0.0), 1.0) * step[i]) <= reach
+    most = int(at[count] / spacing) + 2 * count + 2
+    points, lengths = np.empty(most, np.complex128), np.empty(most)
+    total = first = 0
+    for i in range(count):
+        if not near[i]:
+            first = i + 1
+            continue
+        turn = step[min(i + 1, count - 1)] * step[i].conjugate()
+        if near[i + 1] and abs(cmath.phase(turn)) <= math.radians(15.0):
+            continue
+        begin, length = at[first], at[i + 1] - at[first]
+        parts = max(math.ceil(length / spacing - relative), 1)
+        for k in range(parts + 1):
+            place = begin + length * (k / parts)
+            while first < i and at[first + 1] < place:
+                first += 1
+            size = at[first + 1] - at[first]
+            part = min((place - at[first]) / size, 1.0) if size > 0.0 else 0.0
+            points[total] = chain[first] + part * step[first]
+            lengths[total] = length / parts * (0.5 if k in (0, parts) else 1.0)
+            if abs(points[total]) <= reach:
+                total += 1
+        first = i + 1
+    return points[:total], lengths[:total]
