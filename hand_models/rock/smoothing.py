@@ -257,12 +257,14 @@ class OutlinedHold(Hold):
         load_compiled()
         self._scale = Scale.of(hand)
 
-    def finger_rock(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> FingerRock:
+    def finger_rock(
+        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike, *, tiles_only: bool = False
+    ) -> FingerRock:
         """Return the envelope of the rock across a finger's width, in the finger's plane, smoothed.
 
         The envelope is the least t of the rock across the tiles, and across the phalanges' frames.
         Where rock reaches back under an overhang in the finger's plane by more than a bridged gap,
-        only the cut in this plane is used. Arguments are those of `Hold.section`.
+        only the cut in this plane is used. Arguments are those of `Hold.finger_rock`.
 
         Returns
         -------
@@ -299,6 +301,8 @@ class OutlinedHold(Hold):
             tile=np.minimum(heights.tile, own), frame=np.minimum(heights.frame, own)
         )
         tile = envelope(heights.tile, heights.tile_ends)
+        if tiles_only:
+            return FingerRock(tile)
         frame = envelope(heights.frame, heights.frame_ends)
         return FingerRock(tile, frame, _strips(scale, heights, tile))
 

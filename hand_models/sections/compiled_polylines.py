@@ -14,7 +14,7 @@ import numpy as np
 from hand_models.base import Array, Indices, compiled
 from hand_models.sections.section import Complexes
 
-__all__ = ["equal_parts", "highest_rock", "nearest_segments"]
+__all__ = ["equal_parts", "highest_rock", "nearest_segments", "signed_distances"]
 
 
 @compiled()
@@ -28,10 +28,23 @@ def _from_segment(vertices: Array, at: int, s: float, t: float) -> tuple[float, 
 
 @compiled("f2", "i1", "f2")
 def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Indices, Array, Array]:
-    """Return the nearest segment to each of n points (n, 2) [m]; see `Boundary.nearest`.
+    """Return the nearest segment to each of n points.
 
-    ``vertices`` (p, 2) and ``ends``: points of the polylines [m], and the index at which each ends.
-    The vectors to the points are returned as (s, t), shape (n, 2).
+    Parameters
+    ----------
+    vertices, ends : ndarray, shapes (p, 2) and (k,)
+        Points of the polylines [m], and the index at which each ends.
+    points : ndarray, shape (n, 2)
+        Points (s, t) [m].
+
+    Returns
+    -------
+    segments : ndarray of int, shape (n,)
+        Index of the point of the polylines at which the segment begins.
+    parts : ndarray, shape (n,)
+        Place nearest to the point as a share of the segment's length, in [0, 1].
+    away : ndarray, shape (n, 2)
+        Vector (s, t) from that place to the point [m].
     """
     longest, begin = 1e-9, 0  # [m] or else the longest segment
     for end in ends:
@@ -48,8 +61,8 @@ def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Ind
         _, x, y = _from_segment(vertices, nearest, s, t)
         least = math.sqrt(x * x + y * y) * (1.0 + 1e-12) + 1e-15  # [m] it is found once more
         square, begin = math.inf, 0
-        for piece in range(len(ends)):
-            at, begin = begin, ends[piece]
+        for end in ends:
+            at, begin = begin, end
             while at < begin - 1:
                 x, y = s - vertices[at, 0], t - vertices[at, 1]
                 # what is within so many segments of a vertex that is farther is farther, too
@@ -61,10 +74,44 @@ def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Ind
                 if x * x + y * y < square:
                     square = x * x + y * y
                     least = min(least, math.sqrt(square))
-                    nearest, segments[i], parts[i] = at, at - piece, part
+                    nearest, segments[i], parts[i] = at, at, part
                     away[i, 0], away[i, 1] = x, y
                 at += 1
     return segments, parts, away
+
+
+@compiled()
+def _out(vertices: Array, at: int, way: Array) -> float:
+    """Return how far a way leads out of the rock, along the normal of segment ``at``."""
+    u, v = vertices[at + 1, 0] - vertices[at, 0], vertices[at + 1, 1] - vertices[at, 1]
+    return float((way[0] * v - way[1] * u) / math.sqrt(u * u + v * v))
+
+
+@compiled("f2", "i1", "f2")
+def signed_distances(vertices: Array, ends: Indices, points: Array) -> Array:
+    """Return the distance of each of n points from polylines, negative inside the rock, (n,) [m].
+
+    Where rock ends nothing is inside. Arguments are those of `nearest_segments`.
+    """
+    segments, parts, away = nearest_segments(vertices, ends, points)
+    found = np.empty(len(points))
+    for i in range(len(points)):
+        at, piece = segments[i], 0
+        while ends[piece] <= at:
+            piece += 1
+        first, last = ends[piece - 1] if piece else 0, ends[piece] - 1
+        ring = vertices[first, 0] == vertices[last, 0] and vertices[first, 1] == vertices[last, 1]
+        out = _out(vertices, at, away[i])
+        # at a corner both its segments count
+        if parts[i] <= 0.0:
+            before = at - 1 if at > first else last - 1
+            out = out + _out(vertices, before, away[i]) if at > first or ring else 0.0
+        elif parts[i] >= 1.0:
+            after = at + 1 if at + 1 < last else first
+            out = out + _out(vertices, after, away[i]) if at + 1 < last or ring else 0.0
+        distance = math.sqrt(away[i, 0] ** 2 + away[i, 1] ** 2)
+        found[i] = -distance if out < 0.0 else distance
+    return found
 
 
 @compiled("f2", "i1", "f1", "f1")
