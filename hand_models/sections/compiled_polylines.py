@@ -140,9 +140,9 @@ def highest_rock(vertices: Array, ends: Indices, low: Array, high: Array) -> Arr
     return least
 
 
-@compiled("c1", "f0", "f0", "f0")
+@compiled("c1", "f1", "f0", "f0", "f0")
 def equal_parts(
-    chain: Complexes, reach: float, spacing: float, relative: float
+    chain: Complexes, sizes: Array, reach: float, spacing: float, relative: float
 ) -> tuple[Complexes, Array]:
     """Return places on a curve, at its corners and in equal steps between, and their lengths [m].
 
@@ -150,8 +150,10 @@ def equal_parts(
     ----------
     chain : ndarray of complex, shape (n,)
         Points s + i t of the curve [m].
+    sizes : ndarray, shape (n − 1,)
+        Distances from each point to the next [m].
     reach : float
-        Distance from the origin beyond which the curve is left out [m].
+        Distance from the origin beyond which pieces between points are left out [m].
     spacing : float
         Largest step [m].
     relative : float
@@ -160,31 +162,31 @@ def equal_parts(
     count = len(chain) - 1
     at, near, step = np.zeros(count + 1), np.zeros(count + 1, np.bool_), np.diff(chain)
     for i in range(count):
-        size = abs(step[i])
-        at[i + 1] = at[i] + size
-        part = -(chain[i] * step[i].conjugate()).real / max(size * size, 1e-24)
+        part = -(chain[i] * step[i].conjugate()).real / max(sizes[i] * sizes[i], 1e-24)
         near[i] = abs(chain[i] + min(max(part, 0.0), 1.0) * step[i]) <= reach
-    most = int(at[count] / spacing) + 2 * count + 2
+    most = int(sizes.sum() / spacing) + 2 * count + 2
     points, lengths = np.empty(most, np.complex128), np.empty(most)
     total = first = 0
     for i in range(count):
+        at[i + 1] = at[i] + sizes[i]
         if not near[i]:
-            first = i + 1
+            first, at[i + 1] = i + 1, 0.0
             continue
         turn = step[min(i + 1, count - 1)] * step[i].conjugate()
         if near[i + 1] and abs(cmath.phase(turn)) <= math.radians(15.0):
             continue
-        begin, length = at[first], at[i + 1] - at[first]
+        length = at[i + 1]
         parts = max(math.ceil(length / spacing - relative), 1)
         for k in range(parts + 1):
-            place = begin + length * (k / parts)
-            while first < i and at[first + 1] < place:
+            place = k * (length / parts) if k < parts else length
+            while first <= i and at[first + 1] <= place:
                 first += 1
-            size = at[first + 1] - at[first]
-            part = min((place - at[first]) / size, 1.0) if size > 0.0 else 0.0
-            points[total] = chain[first] + part * step[first]
+            points[total] = chain[first]
+            if first <= i:
+                per_length = 1.0 / (at[first + 1] - at[first])
+                along, into = step[first].real * per_length, step[first].imag * per_length
+                points[total] += complex(along, into) * (place - at[first])
             lengths[total] = length / parts * (0.5 if k in (0, parts) else 1.0)
-            if abs(points[total]) <= reach:
-                total += 1
-        first = i + 1
+            total += 1
+        first, at[i + 1] = i + 1, 0.0
     return points[:total], lengths[:total]

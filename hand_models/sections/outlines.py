@@ -95,7 +95,8 @@ def _points(section: Section | None, reach: float, spacing: float) -> tuple[Comp
 
     found: list[tuple[Complexes, Array]] = [(np.zeros(0, dtype=complex), np.zeros(0))]
     for chain in () if section is None else section.outline(reach, spacing):
-        curve = np.ascontiguousarray(chain)
-        found.append(equal_parts(curve, reach, spacing, BASE_TOLERANCES.relative))
+        curve, sizes = np.ascontiguousarray(chain), np.abs(np.diff(chain))
+        found.append(equal_parts(curve, sizes, reach, spacing, BASE_TOLERANCES.relative))
     points, lengths = (np.concatenate(values) for values in zip(*found, strict=True))
-    return points, lengths
+    kept = np.abs(points) <= reach
+    return points[kept], lengths[kept]
