@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -52,7 +52,8 @@ class Refused(NamedTuple):
     Attributes
     ----------
     depth : float
-        Depth of the rock inside the open finger [m]; zero if no equilibrium was found.
+        Depth of the rock inside the open finger [m]; zero if no equilibrium was found, or looked
+        for.
     lift : float
         Distance along −z of the finger frame F by which the finger would have to be lifted clear of
         the rock [m]; infinite if a finger's length is not enough, NaN if not searched for.
@@ -89,19 +90,24 @@ def cling(model: FingerModel, section: Section | None) -> ClosedFinger | Refused
     return ClosedFinger(SettledFinger(model, tuple(contacts)), nothing, nothing, nothing)
 
 
-def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[ClosedFinger | Refused]:
+def close_all(
+    model: FingerModel, closings: Sequence[OpenFinger], hands: Sequence[Hashable] | None = None
+) -> list[ClosedFinger | Refused]:
     """Close n fingers on the rock together, along their paths (`hand_models.finger.closing`).
 
     Parameters
     ----------
     model : FingerModel
     closings : sequence of OpenFinger, length n
+    hands : sequence, length n, optional
+        The hand that each finger belongs to: fingers of a hand that has rock in one of them are not
+        closed. Each finger is by itself by default.
 
     Returns
     -------
     list of ClosedFinger or Refused, length n
         In the order of ``closings``; `Refused` for a finger that starts inside the rock even with
-        its joints fully open, or that finds no equilibrium.
+        its joints fully open, that finds no equilibrium, or none of which is looked for.
     """
     from hand_models.finger.closing import follow
 
@@ -119,6 +125,13 @@ def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[Closed
         _refused(shape, each, angles) if starts and each.sections else None
         for each, angles, starts in zip(rocks, lower, shut.tolist(), strict=True)
     ]
+    if hands is not None:
+        refused = {hand for hand, each in zip(hands, found, strict=True) if each is not None}
+        idle = Refused(0.0, np.nan)
+        found = [
+            idle if each is None and hand in refused else each
+            for hand, each in zip(hands, found, strict=True)
+        ]
     going = np.array([i for i, each in enumerate(found) if each is None], dtype=np.intp)
     if not len(going):
         return [each for each in found if each is not None]

@@ -43,6 +43,20 @@ def _size(way: complex) -> float:
 
 
 @compiled()
+def _from_line(
+    places: Complexes, joint: complex, u: complex, start: float, end: float, height: float
+) -> Array:
+    """Return the distances of places from a line along a phalanx at a height, from start to end."""
+    away = np.empty(len(places))
+    for i in range(len(places)):
+        x, z = places[i].real - joint.real, places[i].imag - joint.imag
+        along, above = x * u.real + z * u.imag, z * u.real - x * u.imag - height
+        along -= min(max(along, start), end)
+        away[i] = math.sqrt(along * along + above * above)
+    return away
+
+
+@compiled()
 def _from_tile(shape: Record, seen: complex, lift: float) -> complex:
     """Return the way to a point from the axis under the tile."""
     return seen - complex(_clipped(seen.real, shape.near, shape.far), lift)
@@ -73,10 +87,7 @@ def _from_axis(shape: Record, seen: complex, bare: bool) -> tuple[complex, float
 
 @compiled()
 def _alone(shape: Record, length: float) -> float:
-    """Return how far a bed of springs sinks if it rests on a single point of rock [m].
-
-    ``length``: boundary length w that the point represents [m].
-    """
+    """Return how far a bed sinks on a single point of rock that represents a length w [m]."""
     root = shape.fine * math.sqrt(shape.length)
     return float(min(root / math.sqrt(length), shape.far))
 
@@ -151,8 +162,7 @@ def phalanx_beside(
         if depths[i] < depths[first]:
             first = i
     gap = _level(settings, shape, depths, lengths, first) - shape.fine
-    # divides what is zero
-    tiny = 1e-30
+    tiny = 1e-30  # divides what is zero
     total, place, push = 0.0, 0.0j, 0.0j
     for i in range(len(points)):
         pressed = (gap + depth - depths[i]) * lengths[i]
@@ -194,25 +204,28 @@ def near_points(
     """
     shape, back, count = shape[0], u.conjugate(), len(centres)
     each = len(points) // count
-    # distance of blocks from the whole axis, which is no larger than that from under the tile
-    whole, most, most_tile = np.empty(count), math.inf, math.inf
-    for block in range(count):
-        seen, radius = (centres[block] - joint) * back, radii[block] + shape.lift
-        to_end = _size(seen - _clipped(seen.real, shape.near, shape.end))
-        whole[block] = to_end - radius
-        if to_end + radius < most:
-            most = min(most, to_end + radius + _alone(shape, longest[block]))
-        if to_end + radius < most_tile:
-            to_far = _size(seen - _clipped(seen.real, shape.near, shape.far))
-            most_tile = min(most_tile, to_far + radius)
+    whole = _from_line(centres, joint, u, shape.near, shape.end, 0.0)
+    # the nearest rock under the tiles bounds what is looked at
+    first = np.where(bare[::each], math.inf, whole + radii).argmin()
+    nearest, seen = whole[first] + radii[first], (centres[first] - joint) * back
+    most = nearest + shape.lift + _alone(shape, longest[first])
+    most_tile = _size(_from_tile(shape, seen, shape.lift)) + radii[first]
     found = np.empty(len(points), np.intp)
     size, from_tile = np.empty_like(lengths), np.empty_like(lengths)
     # the bed sinks no lower than with any point alone
     least, least_tile, taken = math.inf, math.inf, 0
     for block in range(count):
-        if whole[block] > max(most, most_tile) + within:
+        if whole[block] - radii[block] - shape.lift > max(most, most_tile) + within:
             continue
-        for i in range(block * each, block * each + each):
+        begin, end = block * each, block * each + each
+        seen = (centres[block] - joint) * back
+        radius = radii[block] + (shape.lift if bare[begin] != bare[end - 1] else 0.0)
+        _, away, off_tile = _from_axis(shape, seen, bare[begin])
+        most = min(most, away + radius + _alone(shape, longest[block]))
+        most_tile = min(most_tile, off_tile + radius)
+        if away - radius > most + within and off_tile - radius > most_tile + within:
+            continue
+        for i in range(begin, end):
             seen = (points[i] - joint) * back
             _, size[taken], from_tile[taken] = _from_axis(shape, seen, bare[i])
             found[taken] = i
@@ -257,17 +270,6 @@ def rock_distances(
 
 
 @compiled()
-def _near_strips(
-    shape: Record, places: Complexes, joint: complex, u: complex, reach: float
-) -> Indices:
-    """Return the places of the strips' rock no farther from a tile than the nearest and reach."""
-    away, back = np.empty(len(places)), u.conjugate()
-    for i in range(len(places)):
-        away[i] = _size(_from_tile(shape, (places[i] - joint) * back, shape.lift))
-    return np.flatnonzero(away <= away.min() + reach)
-
-
-@compiled()
 def _engaged(settings: Record, gap: float, travel: float, exponent: float) -> float:
     """Return the share of spines that reach the rock, as `hand_models.tile.engaged_share` does."""
     if gap <= 0.0:
@@ -292,17 +294,14 @@ def _on_rock(
 
     In each of the strips across a tile its spines reach the rock or not.
     """
-    strips, least = len(across), math.inf
+    strips = len(across)
     if strips == 1:
         share = _engaged(settings, tile_gap, shape.travel, shape.exponent)
         return share, across[0] * share / max(share, settings.sum_rounding)
     if tile_gap >= shape.travel:
         return 0.0, 0.0
-    away, farther = np.empty(len(near)), np.full(strips, math.inf)
-    for i in range(len(near)):
-        seen = (places[near[i]] - joint) * u.conjugate()
-        away[i] = _size(_from_tile(shape, seen, shape.lift))
-        least = min(least, away[i])
+    away = _from_line(places[near], joint, u, shape.near, shape.far, shape.lift)
+    least, farther = away.min(), np.full(strips, math.inf)
     for i in range(len(near)):
         # no spine reaches beyond its travel
         if away[i] - least + tile_gap < shape.travel:
@@ -377,7 +376,8 @@ def put_around(
             )
             reach = bar.travel - tile_gap + within
             if pose == 0 and reach > 0.0 and len(across) > 1:
-                strips = _near_strips(bar, places, joint, along, reach)
+                away = _from_line(places, joint, along, bar.near, bar.far, bar.lift)
+                strips = np.flatnonzero(away <= away.min() + reach)
             share, middle = _on_rock(
                 places, behind, strips, across, settings[0], bar, joint, along, tile_gap
             )

@@ -175,17 +175,23 @@ def close_fingers(
             row_of[k] = known[key]
     alone: dict[int, ClosedFinger] = {}
     lifts: dict[int, float] = {}
-    for k, finger in zip(left, _alone(placed, left, tensions), strict=True):
+    found = zip(left, _alone(placed, left, tensions), strict=True)
+    # a hand with rock in a finger is refused for that, as its other fingers are not closed
+    for k, finger in sorted(found, key=lambda each: not _in_rock(each[1])):
         i = k // len(FINGERS)
         if isinstance(finger, ClosedFinger):
             alone[k], row_of[k] = finger, len(rows)
             rows.append(_row_alone(finger))
             continue
-        if finger.depth > 0.0:
+        if _in_rock(finger):
             lifts[i] = max(finger.lift, lifts.get(i, 0.0))
         if i not in errors:
             errors[i] = _no_way(placed, i, k % len(FINGERS), finger)
     return ClosedFingers(rows, row_of, alone, lifts)
+
+
+def _in_rock(finger: ClosedFinger | Refused) -> bool:
+    return isinstance(finger, Refused) and finger.depth > 0.0
 
 
 def _row_laid(
@@ -215,7 +221,7 @@ def _alone(
     """Close fingers that could not be left as laid, those that are alike once."""
     hand = placed.hand
     keys: list[Hashable] = []
-    closings: dict[Hashable, OpenFinger] = {}
+    closings: dict[tuple[Hashable, ...], OpenFinger] = {}
     closed: dict[Hashable, ClosedFinger | Refused] = {}
     for k in left:
         i, finger = divmod(k, len(FINGERS))
@@ -230,7 +236,9 @@ def _alone(
         if key not in closings:
             closings[key] = OpenFinger(placed.rock(i, finger), *given)
     if closings:
-        found = close_all(hand.finger, list(closings.values()))
+        # what is alike is of several hands, and is by itself
+        hands = [key[0] // len(FINGERS) if isinstance(key[0], int) else key for key in closings]
+        found = close_all(hand.finger, list(closings.values()), hands)
         closed.update(zip(closings, found, strict=True))
     return [closed[key] for key in keys]
 
@@ -238,7 +246,7 @@ def _alone(
 def _no_way(placed: PlacedHands, index: int, finger: int, refused: Refused) -> InvalidInputError:
     """Return why a finger cannot close."""
     name = FINGERS[finger]
-    if not refused.depth > 0.0:
+    if not _in_rock(refused):
         return RefusedPlaceError(
             f"no equilibrium found for {name} on this rock: move or rotate the hand slightly",
             reason="no_equilibrium",

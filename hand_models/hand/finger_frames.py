@@ -105,7 +105,7 @@ class FingerFrame:
             Whether to use `Hold.raw_section`, with steps and edges smaller than a tile.
         """
         plane = self._plane(hand_in_hold)
-        return hold.raw_section(*plane) if raw else hold.finger_rock(*plane).tile
+        return hold.raw_section(*plane) if raw else hold.finger_rock(*plane, tiles_only=True).tile
 
     def rock(self, hold: Hold, hand_in_hold: Pose) -> FingerRock:
         """Return the rock under the finger's whole width, in its frame F; arguments as of `cut`."""

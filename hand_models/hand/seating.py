@@ -221,7 +221,9 @@ class RockUnder:
         self._reach = hand.finger.reach + hand.palm_length
         y = hand.inner_place[1]
         across = np.abs(hand.palm_tiles[:, 1]).max() + 0.5 * hand.palm_tile_size[1]
-        self.under = self._outlines(hold.finger_rock(*self._plane(each)).tile for each in (y, -y))
+        self.under = self._outlines(
+            hold.finger_rock(*self._plane(each), tiles_only=True).tile for each in (y, -y)
+        )
         # lines along the palm on which the highest rock under it is looked for
         lines = np.linspace(-across, across, 5).tolist() if self.under else []
         self._lines = self._outlines(hold.section(*self._plane(each)) for each in lines)

@@ -12,7 +12,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices, compiled
 
-__all__ = ["facing_triangles", "heights_across", "rock_ends"]
+__all__ = ["depths_behind", "facing_triangles", "heights_across", "rock_ends"]
 
 Point = tuple[float, float, float]
 
@@ -74,26 +74,31 @@ def facing_triangles(
         In the order of each triangle's corners [m].
     """
     axes, found, total = _axes(plane), np.empty((len(some), 3, 3)), 0
-    for one in some:
+    # without a branch, so that the processor waits for the memory of many triangles at once
+    for i in range(len(some)):
+        for corner in range(3):
+            at = faces[some[i], corner]
+            x, y, z = vertices[at, 0], vertices[at, 1], vertices[at, 2]
+            x, y, z = x - plane[0, 0], y - plane[0, 1], z - plane[0, 2]
+            for k in range(3):
+                found[i, corner, k] = axes[k, 0] * x + axes[k, 1] * y + axes[k, 2] * z
+    for i in range(len(some)):
         inside = True
-        # y first, by which most triangles are left out
         for k, most in ((1, half), (2, reach), (0, reach)):
-            low, high = math.inf, -math.inf
-            for corner in range(3):
-                at = faces[one, corner]
-                x = 0.0
-                for j in range(3):
-                    x += axes[k, j] * (vertices[at, j] - plane[0, j])
-                found[total, corner, k] = x
-                low, high = min(low, x), max(high, x)
+            low = min(found[i, 0, k], found[i, 1, k], found[i, 2, k])
+            high = max(found[i, 0, k], found[i, 1, k], found[i, 2, k])
             if low > most or high < -most:
                 inside = False
                 break
         if not inside:
             continue
-        a, b, c = found[total]
         # counterclockwise seen from outside is clockwise in (s, y), as t goes into the rock
-        if (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]) < 0.0:
+        b_s, b_y = found[i, 1, 0] - found[i, 0, 0], found[i, 1, 1] - found[i, 0, 1]
+        c_s, c_y = found[i, 2, 0] - found[i, 0, 0], found[i, 2, 1] - found[i, 0, 1]
+        if b_s * c_y - c_s * b_y < 0.0:
+            for corner in range(3):
+                for k in range(3):
+                    found[total, corner, k] = found[i, corner, k]
             total += 1
     return found[:total]
 
@@ -212,3 +217,42 @@ def rock_ends(triangles: Array, s: Array, half: float, least: Array, gap: float)
                 if first and not (at, t) >= (ends[0, after, 0], ends[0, after, 1]):
                     ends[0, after, 0], ends[0, after, 1] = at, t
     return ends
+
+
+@compiled("f2", "i1", "f1", "f1", "f2", "f0")
+def depths_behind(
+    points: Array, stops: Indices, s: Array, envelope: Array, lines: Array, least: float
+) -> Array:
+    """Return how far rock on k lines along a finger lies behind an envelope, at n points of it.
+
+    Parameters
+    ----------
+    points, stops : ndarray
+        Points (s, t) of the envelope's smoothed outlines [m], and the index at which each ends.
+    s : ndarray, shape (g,)
+        Places in equal steps, ascending [m].
+    envelope, lines : ndarray, shapes (g,) and (k, g)
+        t of the envelope and of the lines' rock at these places; infinite without rock [m].
+    least : float
+        Least cosine of the angle between t and the outlines' normals.
+
+    Returns
+    -------
+    ndarray, shape (n, k)
+        Depths along the outlines' normals; infinite without rock [m].
+    """
+    behind, begin = np.full((len(points), len(lines)), math.inf), 0
+    for stop in stops:
+        for i in range(begin, stop):
+            a, b = points[max(i - 1, begin)], points[min(i + 1, stop - 1)]
+            along, into = b[0] - a[0], b[1] - a[1]
+            upright = max(along / math.sqrt(along * along + into * into), least)
+            place = (points[i, 0] - s[0]) / (s[1] - s[0])
+            at = min(max(int(place), 0), len(s) - 2)
+            for k in range(len(lines)):
+                depth, after = lines[k, at] - envelope[at], lines[k, at + 1] - envelope[at + 1]
+                depth += (place - at) * (after - depth)
+                if np.isfinite(depth):
+                    behind[i, k] = max(depth, 0.0) * upright
+        begin = stop
+    return behind

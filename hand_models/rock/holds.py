@@ -97,11 +97,12 @@ class Hold(ABC):
         """
         return self.section(origin, s_axis, t_axis)
 
-    def finger_rock(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> FingerRock:
-        """Return the rock that a finger meets with its whole width, in its plane.
+    def finger_rock(
+        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike, *, tiles_only: bool = False
+    ) -> FingerRock:
+        """Return the rock that a finger meets with its width, in its plane; in this class alike.
 
-        Arguments are those of `section`. In this base class the rock is taken to be the same
-        across the finger as in its plane.
+        Arguments are those of `section`; ``tiles_only`` leaves out rock beside tiles, and strips.
         """
         return FingerRock(self.section(origin, s_axis, t_axis))
 
@@ -191,9 +192,8 @@ class Hold(ABC):
     def tangent_point(self, offset: float, angle: Angle) -> tuple[Angle, Angle] | None:
         """Return the point of the outline in the plane y = ``offset`` where it has a given slope.
 
-        Only an ellipsoid answers; every other hold returns None. ``angle``: of the outline's
-        tangent from x toward z [rad], one or an array; the result is x and z of that shape [m], or
-        None where the plane misses the hold.
+        None from other holds than an ellipsoid, and where the plane misses it. ``angle``: of the
+        tangent from x toward z [rad], one or an array; the result is x and z of that shape [m].
         """
         return None
 

@@ -233,17 +233,12 @@ def _strips(scale: Scale, heights: Heights, section: PolylineSection | None) -> 
     """Return how far the rock of each strip under a finger's tiles lies behind their envelope."""
     if section is None:
         return NO_STRIPS
-    places = np.concatenate(section.pieces)
-    s = scale.places
-    at = np.clip(((places[:, 0] - s[0]) / (s[1] - s[0])).astype(np.intp), 0, len(s) - 2)
-    part = (places[:, 0] - s[at]) / (s[1] - s[0])
-    with np.errstate(invalid="ignore"):
-        depths = heights.lines - heights.tile
-        depths = depths[:, at] + part * (depths[:, at + 1] - depths[:, at])
-    along, into = np.concatenate([np.gradient(curve, axis=0) for curve in section.pieces]).T
-    upright = np.maximum(along / np.hypot(along, into), BASE_TOLERANCES.angle)
-    behind = np.where(np.isfinite(depths), np.maximum(depths, 0.0) * upright, np.inf)
-    return RockStrips(scale.lines, places[:, 0] + 1j * places[:, 1], behind.T)
+    from hand_models.rock.compiled_heights import depths_behind
+
+    points, stops = strung(section.pieces)
+    least = BASE_TOLERANCES.angle
+    behind = depths_behind(points, stops, scale.places, heights.tile, heights.lines, least)
+    return RockStrips(scale.lines, points.view(complex)[:, 0], behind)
 
 
 class OutlinedHold(Hold):
@@ -262,12 +257,14 @@ class OutlinedHold(Hold):
         load_compiled()
         self._scale = Scale.of(hand)
 
-    def finger_rock(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> FingerRock:
+    def finger_rock(
+        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike, *, tiles_only: bool = False
+    ) -> FingerRock:
         """Return the envelope of the rock across a finger's width, in the finger's plane, smoothed.
 
         The envelope is the least t of the rock across the tiles, and across the phalanges' frames.
         Where rock reaches back under an overhang in the finger's plane by more than a bridged gap,
-        only the cut in this plane is used. Arguments are those of `Hold.section`.
+        only the cut in this plane is used. Arguments are those of `Hold.finger_rock`.
 
         Returns
         -------
@@ -304,6 +301,8 @@ class OutlinedHold(Hold):
             tile=np.minimum(heights.tile, own), frame=np.minimum(heights.frame, own)
         )
         tile = envelope(heights.tile, heights.tile_ends)
+        if tiles_only:
+            return FingerRock(tile)
         frame = envelope(heights.frame, heights.frame_ends)
         return FingerRock(tile, frame, _strips(scale, heights, tile))
 

@@ -1,4 +1,4 @@
-from .boundary import stretch_minima as stretch_minima, strung as strung
+from .boundary import strung as strung
 from .finger_rock import (
     NO_STRIPS as NO_STRIPS,
     FingerRock as FingerRock,

@@ -1,4 +1,4 @@
-"""Search the polylines that bound rock: nearest segments, and the highest place (compiled).
+"""Search and sample polylines that bound rock: nearest segments, highest places (compiled).
 
 Several polylines are an array of their points, one after another, and the index at which each ends.
 Segments are counted through all of them.
@@ -6,13 +6,15 @@ Segments are counted through all of them.
 
 from __future__ import annotations
 
+import cmath
 import math
 
 import numpy as np
 
 from hand_models.base import Array, Indices, compiled
+from hand_models.sections.section import Complexes
 
-__all__ = ["highest_rock", "nearest_segments"]
+__all__ = ["equal_parts", "highest_rock", "nearest_segments", "signed_distances"]
 
 
 @compiled()
@@ -26,10 +28,23 @@ def _from_segment(vertices: Array, at: int, s: float, t: float) -> tuple[float, 
 
 @compiled("f2", "i1", "f2")
 def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Indices, Array, Array]:
-    """Return the nearest segment to each of n points (n, 2) [m]; see `Boundary.nearest`.
+    """Return the nearest segment to each of n points.
 
-    ``vertices`` (p, 2) and ``ends``: points of the polylines [m], and the index at which each ends.
-    The vectors to the points are returned as (s, t), shape (n, 2).
+    Parameters
+    ----------
+    vertices, ends : ndarray, shapes (p, 2) and (k,)
+        Points of the polylines [m], and the index at which each ends.
+    points : ndarray, shape (n, 2)
+        Points (s, t) [m].
+
+    Returns
+    -------
+    segments : ndarray of int, shape (n,)
+        Index of the point of the polylines at which the segment begins.
+    parts : ndarray, shape (n,)
+        Place nearest to the point as a share of the segment's length, in [0, 1].
+    away : ndarray, shape (n, 2)
+        Vector (s, t) from that place to the point [m].
     """
     longest, begin = 1e-9, 0  # [m] or else the longest segment
     for end in ends:
@@ -46,8 +61,8 @@ def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Ind
         _, x, y = _from_segment(vertices, nearest, s, t)
         least = math.sqrt(x * x + y * y) * (1.0 + 1e-12) + 1e-15  # [m] it is found once more
         square, begin = math.inf, 0
-        for piece in range(len(ends)):
-            at, begin = begin, ends[piece]
+        for end in ends:
+            at, begin = begin, end
             while at < begin - 1:
                 x, y = s - vertices[at, 0], t - vertices[at, 1]
                 # what is within so many segments of a vertex that is farther is farther, too
@@ -59,10 +74,44 @@ def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Ind
                 if x * x + y * y < square:
                     square = x * x + y * y
                     least = min(least, math.sqrt(square))
-                    nearest, segments[i], parts[i] = at, at - piece, part
+                    nearest, segments[i], parts[i] = at, at, part
                     away[i, 0], away[i, 1] = x, y
                 at += 1
     return segments, parts, away
+
+
+@compiled()
+def _out(vertices: Array, at: int, way: Array) -> float:
+    """Return how far a way leads out of the rock, along the normal of segment ``at``."""
+    u, v = vertices[at + 1, 0] - vertices[at, 0], vertices[at + 1, 1] - vertices[at, 1]
+    return float((way[0] * v - way[1] * u) / math.sqrt(u * u + v * v))
+
+
+@compiled("f2", "i1", "f2")
+def signed_distances(vertices: Array, ends: Indices, points: Array) -> Array:
+    """Return the distance of each of n points from polylines, negative inside the rock, (n,) [m].
+
+    Where rock ends nothing is inside. Arguments are those of `nearest_segments`.
+    """
+    segments, parts, away = nearest_segments(vertices, ends, points)
+    found = np.empty(len(points))
+    for i in range(len(points)):
+        at, piece = segments[i], 0
+        while ends[piece] <= at:
+            piece += 1
+        first, last = ends[piece - 1] if piece else 0, ends[piece] - 1
+        ring = vertices[first, 0] == vertices[last, 0] and vertices[first, 1] == vertices[last, 1]
+        out = _out(vertices, at, away[i])
+        # at a corner both its segments count
+        if parts[i] <= 0.0:
+            before = at - 1 if at > first else last - 1
+            out = out + _out(vertices, before, away[i]) if at > first or ring else 0.0
+        elif parts[i] >= 1.0:
+            after = at + 1 if at + 1 < last else first
+            out = out + _out(vertices, after, away[i]) if at + 1 < last or ring else 0.0
+        distance = math.sqrt(away[i, 0] ** 2 + away[i, 1] ** 2)
+        found[i] = -distance if out < 0.0 else distance
+    return found
 
 
 @compiled("f2", "i1", "f1", "f1")
@@ -89,3 +138,55 @@ def highest_rock(vertices: Array, ends: Indices, low: Array, high: Array) -> Arr
                         least[i] = min(least[i], t + part * (t_after - t))
             begin = end
     return least
+
+
+@compiled("c1", "f1", "f0", "f0", "f0")
+def equal_parts(
+    chain: Complexes, sizes: Array, reach: float, spacing: float, relative: float
+) -> tuple[Complexes, Array]:
+    """Return places on a curve, at its corners and in equal steps between, and their lengths [m].
+
+    Parameters
+    ----------
+    chain : ndarray of complex, shape (n,)
+        Points s + i t of the curve [m].
+    sizes : ndarray, shape (n − 1,)
+        Distances from each point to the next [m].
+    reach : float
+        Distance from the origin beyond which pieces between points are left out [m].
+    spacing : float
+        Largest step [m].
+    relative : float
+        Part of a step by which steps may be too long by rounding.
+    """
+    count = len(chain) - 1
+    at, near, step = np.zeros(count + 1), np.zeros(count + 1, np.bool_), np.diff(chain)
+    for i in range(count):
+        part = -(chain[i] * step[i].conjugate()).real / max(sizes[i] * sizes[i], 1e-24)
+        near[i] = abs(chain[i] + min(max(part, 0.0), 1.0) * step[i]) <= reach
+    most = int(sizes.sum() / spacing) + 2 * count + 2
+    points, lengths = np.empty(most, np.complex128), np.empty(most)
+    total = first = 0
+    for i in range(count):
+        at[i + 1] = at[i] + sizes[i]
+        if not near[i]:
+            first, at[i + 1] = i + 1, 0.0
+            continue
+        turn = step[min(i + 1, count - 1)] * step[i].conjugate()
+        if near[i + 1] and abs(cmath.phase(turn)) <= math.radians(15.0):
+            continue
+        length = at[i + 1]
+        parts = max(math.ceil(length / spacing - relative), 1)
+        for k in range(parts + 1):
+            place = k * (length / parts) if k < parts else length
+            while first <= i and at[first + 1] <= place:
+                first += 1
+            points[total] = chain[first]
+            if first <= i:
+                per_length = 1.0 / (at[first + 1] - at[first])
+                along, into = step[first].real * per_length, step[first].imag * per_length
+                points[total] += complex(along, into) * (place - at[first])
+            lengths[total] = length / parts * (0.5 if k in (0, parts) else 1.0)
+            total += 1
+        first, at[i + 1] = i + 1, 0.0
+    return points[:total], lengths[:total]

@@ -34,7 +34,7 @@ class Outlines(NamedTuple):
     longest : ndarray, shape (n, p / 16)
         Largest of the lengths in each block [m].
     bare : ndarray of bool, shape (n, p)
-        True for rock that the bare frame meets, beside the tiles.
+        True for rock that the bare frame meets, beside the tiles, and for what fills up.
     places, behind, across : ndarray, shapes (n, c), (n, c, k) and (n, k)
         Rock in the strips across each finger's tiles, as in `RockStrips`.
     """
@@ -73,7 +73,7 @@ class Outlines(NamedTuple):
         for i, (under, beside) in enumerate(taken):
             for values, own, more in zip((points, lengths), under, beside, strict=True):
                 values[i, : len(own) + len(more)] = np.concatenate([own, more])
-            bare[i, len(under[0]) : len(under[0]) + len(beside[0])] = True
+            bare[i, len(under[0]) :] = True
         strips = [rock.strips for rock in rocks]
         k = max(len(each.across) for each in strips)
         places = np.full((len(rocks), max([1, *(len(each.places) for each in strips)])), 1e3 + 0j)
@@ -91,29 +91,12 @@ class Outlines(NamedTuple):
 
 def _points(section: Section | None, reach: float, spacing: float) -> tuple[Complexes, Array]:
     """Return places along the boundary within reach, at its corners as well, and their lengths."""
+    from hand_models.sections.compiled_polylines import equal_parts
+
     found: list[tuple[Complexes, Array]] = [(np.zeros(0, dtype=complex), np.zeros(0))]
     for chain in () if section is None else section.outline(reach, spacing):
-        begin, step = chain[:-1], np.diff(chain)
-        size = np.abs(step)
-        part = -(begin * step.conj()).real / np.maximum(size * size, 1e-12**2)
-        near = np.abs(begin + np.clip(part, 0.0, 1.0) * step) <= reach
-        # runs of pieces that come within reach, from corner to corner
-        ends = np.diff(near.astype(np.int8), prepend=0, append=0).nonzero()[0]
-        turns = np.abs(np.angle(step[1:] * step[:-1].conj())) > math.radians(15.0)
-        corners = (turns & near[1:] & near[:-1]).nonzero()[0] + 1
-        stops = np.sort(np.concatenate([ends, corners, corners]))
-        for first, last in stops.reshape(-1, 2).tolist():
-            found.append(_parts(chain[first : last + 1], size[first:last], spacing))
+        curve, sizes = np.ascontiguousarray(chain), np.abs(np.diff(chain))
+        found.append(equal_parts(curve, sizes, reach, spacing, BASE_TOLERANCES.relative))
     points, lengths = (np.concatenate(values) for values in zip(*found, strict=True))
     kept = np.abs(points) <= reach
     return points[kept], lengths[kept]
-
-
-def _parts(chain: Complexes, size: Array, spacing: float) -> tuple[Complexes, Array]:
-    """Return the ends of equal parts of a chain whose pieces have these lengths, and theirs [m]."""
-    at = np.append(0.0, np.cumsum(size))
-    count = max(math.ceil(at[-1] / spacing - BASE_TOLERANCES.relative), 1)
-    places = np.linspace(0.0, at[-1], count + 1)
-    lengths = np.full(count + 1, at[-1] / count)
-    lengths[[0, -1]] *= 0.5
-    return np.interp(places, at, chain), lengths

@@ -316,6 +316,19 @@ def test_fingers_close_together_as_they_do_alone(seed):
         assert_alike(other, alone)
 
 
+def test_a_hand_with_rock_in_a_finger_closes_no_other():
+    free, deep = (FingerRock(Disc(complex(0.05, z), 0.05)) for z in (0.07, 0.02))
+    closings = [OpenFinger(rock, ROCK, 37.0) for rock in (free, deep, free, free)]
+    apart = close_all(MODEL, closings)
+    found = close_all(MODEL, closings, ["one", "one", "two", "three"])
+    assert found[0] == Refused(0.0, pytest.approx(math.nan, nan_ok=True))
+    assert found[1] == apart[1]
+    assert isinstance(apart[1], Refused)
+    assert apart[1].depth > 0.0
+    for closed, alone in zip(found[2:], apart[2:], strict=True):
+        assert_alike(closed, alone)
+
+
 @given_some(4, 40, seeds)
 def test_what_is_scaled_closes_alike(seed):
     """Lengths by a, forces by b: springs' torques by a b, stiffness of the bed by b / a."""
