@@ -351,8 +351,8 @@ def print_route(
         _print_moves(summary["climb"], out)
         if climb.failure is not None and not climb.fails:
             out.print(
-                'The route has no joints, and its stages are planned without; with "joints": "solve"'
-                " in its stance they are planned with those of the climb."
+                'The route has no joints, and its stages are planned without; with "joints": '
+                '"solve" in its stance they are planned with those of the climb.'
             )
     print_warnings(summary["warnings"], out)
     out.print(summary["crux"]["sentence"])
