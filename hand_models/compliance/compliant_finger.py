@@ -181,6 +181,9 @@ class CompliantFingers:
         self._bearing = np.full((len(fingers), len(PHALANGES)), -1)
         for bearing, each in zip(self._bearing, fingers, strict=True):
             bearing[list(each.finger.free)] = each.finger.bearing
+        self._shares = np.array(
+            [[contact.bearing_share for contact in each.finger.contacts] for each in fingers]
+        )
 
     def loads(
         self,
@@ -247,7 +250,7 @@ class CompliantFingers:
             if len(free):
                 bears = free, self._bearing[free, i]
                 arm = press_moments[bears] - dot(joint[free], u[bears])
-                normals[bears] = load = left[free, i] / arm
+                normals[bears] = load = self._shares[bears][:, None] * left[free, i] / arm
                 force[free] -= load[:, None] * presses[bears]
                 moment[free] -= load * press_moments[bears]
                 left[free, i] = 0.0

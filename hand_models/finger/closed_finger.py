@@ -259,11 +259,14 @@ def _closed(
         near, far = model.tile_range
         for j, place in enumerate(places[row].tolist()):
             kind, along, rise, tilt, phi = "none", model.tile_centre, 0.0, 0.0, 0.0
+            bearing = 1.0
             if bears[j]:
                 along, rise = place.real, place.imag - model.tile_height
                 kind, tilt = "frame", float(tilts[row, j])
             if caught[j]:
                 kind, phi = "face" if near < along < far else "edge", float(share[row, j])
+                if mode[j] != CONTACT_CODES.on:
+                    bearing = min(phi / model.least_share, 1.0)
             joint = complex(joints[row, j])
             contacts.append(
                 Contact(
@@ -276,6 +279,7 @@ def _closed(
                     tilt,
                     phi,
                     float(around["across"][row, j]) if caught[j] else 0.0,
+                    bearing,
                 )
             )
         finger, of_tile = SettledFinger(model, tuple(contacts)), closing.base_tile

@@ -275,7 +275,7 @@ def _increment(
         # the least gap is that of the path, not of joints that are on their way back to it
         after.least[j] = state.least[j] if caught else np.inf
         if caught and mode != code.held and size <= settings.path_turn:
-            after.least[j] = min(state.least[j], max(around.gap[j], now.gap[j], 0.0))
+            after.least[j] = min(state.least[j], max(now.gap[j], 0.0))
         if not caught and now.spines[j] != code.caught:
             after.least[j] = state.least[j]
         # spines that were pulled off, and where
@@ -287,7 +287,9 @@ def _increment(
         if now.spines[j] == code.pulled and lost and not drive.lowers:
             after.spines[j] = code.lost
         rate = _product(around.d_gap, grow, j)
-        opens |= caught and mode == code.off and rate > 0.0 and now.gap[j] < state.least[j]
+        # a gap that begins to grow, or joints that have left a state and come to rest in another
+        begins = rate > 0.0 and now.gap[j] < state.least[j]
+        opens |= caught and mode == code.off and (begins or state.damping > 0.0)
         if not now.active[j] and rate < 0.0:
             more = min(more, max((now.gap[j] + 2.0 * shape.closes) / -rate, 0.0))
         # and no contact pushes across a gap, or pulls where nothing holds it
@@ -301,8 +303,12 @@ def _increment(
         if drive.lowers and caught and now.slides[j] == 0 and rate < 0.0:
             forced = min(forced, max(-force / rate, 0.0))
     more = min(more, max(forced, settings.least_tension * drive.closing))
-    # where a gap begins to grow, its least is to be that of the path, not of an increment beside it
+    # where a gap may grow, its least is to be that of the path, not of an increment beside it
     beside = size > settings.path_turn and opens and not air
+    unstable = _curved(move, now.stiffness) or _curved(grow, now.stiffness)
+    if unstable and state.damping > 0.0 and size > settings.damped_turn:
+        # what has lost its stability is to leave at this tension, and is only pushed off
+        more = min(more, settings.least_tension * drive.closing)
     if drive.lowers == 1:
         # from balance to balance
         beside |= max(state.unbalanced, state.damping * size) > settings.balanced * drive.torque

@@ -43,6 +43,8 @@ class FingerModel:
         Distance that spines reach out of their tile [m].
     engagement_exponent : float
         p, exponent of the law of engagement (`engaged_share`).
+    least_share : float
+        φ₀, share of a tile's spines from which on it bears its joint alone (`Contact`).
     frame_radius : float
         Radius of the bare phalanx about the line of its joints [m].
     bed_stiffness : float
@@ -67,6 +69,7 @@ class FingerModel:
     shear_gain: tuple[float, ...]
     spine_travel: float
     engagement_exponent: float
+    least_share: float
     frame_radius: float
     bed_stiffness: float
     friction: float
@@ -100,6 +103,7 @@ class FingerModel:
             shear_gain=tuple((pulleys * contact / (contact + spring)).tolist()),
             spine_travel=table.scalar("tile", "spine_travel"),
             engagement_exponent=table.positive("tile", "engagement_exponent"),
+            least_share=table.positive("tile", "least_share"),
             frame_radius=table.positive("finger", "frame_radius"),
             bed_stiffness=table.positive("tile", "bed_stiffness"),
             friction=table.scalar("tendon", "friction"),
@@ -121,6 +125,10 @@ class FingerModel:
         if not 0.0 <= model.friction < 1.0:
             raise InvalidInputError(
                 f"must be in [0, 1), got {model.friction:g}", field="tendon.friction"
+            )
+        if model.least_share > 1.0:
+            raise InvalidInputError(
+                f"must be in (0, 1], got {model.least_share:g}", field="tile.least_share"
             )
         if not contact.min() > 0.0:
             raise InvalidInputError(

@@ -62,6 +62,10 @@ class Contact:
         Spine engagement: share of the tile's spines on the rock, if the tile touches.
     across : float
         Distance of the contact from the finger's plane, along y of F [m].
+    bearing_share : float
+        w, share of what balances its joint that the contact bears: 1, but φ/φ₀ for spines across a
+        gap that are less than the share φ₀. The joint, taken as locked, carries the rest, as it
+        does all of it without a contact.
     """
 
     angle: float
@@ -73,6 +77,7 @@ class Contact:
     tilt: float = 0.0
     engagement: float = 1.0
     across: float = 0.0
+    bearing_share: float = 1.0
 
     def point(self, height: float) -> tuple[float, float]:
         """Return the contact's place (x, z) in F [m]; ``height``: as `FingerModel.tile_height`."""
@@ -178,6 +183,8 @@ class SettledFinger:
 
         A joint at its limit joins the phalanges on both sides to one link: the joint's equation and
         the load of a phalanx without contact drop out, and the rest is square again (Section 5.7).
+        A contact that bears the share w has w A_ij N_j + (1 − w) A_ii N_i = w b_i in place of its
+        joint's equation A_ij N_j = b_i, so that its load begins at zero where its spines do.
 
         Parameters
         ----------
@@ -200,7 +207,10 @@ class SettledFinger:
         if self.bearing:
             arms, rest = self._joint_balance(shears, base_tile)
             free, bearing = list(self.free), list(self.bearing)
-            normals[bearing] = np.linalg.solve(arms[np.ix_(free, bearing)], rest[free])
+            share = np.array([self.contacts[j].bearing_share for j in bearing])[:, None]
+            A = arms[np.ix_(free, bearing)]
+            A = share * A + np.diag((1.0 - share[:, 0]) * np.diag(A))
+            normals[bearing] = np.linalg.solve(A, share * rest[free])
         return normals
 
     def stop_torques(self, shears: Array, normals: Array, base_tile: bool = False) -> Array:

@@ -35,7 +35,7 @@ from hand_models.tile import Surface
 
 __all__ = ["ClosedPlacement", "read_hands", "write_hands"]
 
-FILE_FORMAT: Final = "crux closed hands 1"
+FILE_FORMAT: Final = "crux closed hands 2"
 """First array of a file of closed hands."""
 
 HAND_ARRAYS: Final = (

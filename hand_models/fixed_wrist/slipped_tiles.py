@@ -120,7 +120,8 @@ def _dragging(
     loads[slipped & ~pressed] = 0.0
     on = np.flatnonzero(pressed)
     normals, shears = _moments(hand, finger, own[on])
-    before = normals @ loads[on, 1] + shears @ loads[on, 0]
+    pressed = loads[on, 1].copy()
+    before = normals @ pressed + shears @ loads[on, 0]
     drags, bears = slipped[on], hand.postures.kinds[finger] != CONTACT_KINDS.index("none")
     at = on[drags]
     loads[at] = 0.0
@@ -128,9 +129,12 @@ def _dragging(
     joined = normals + shears * np.where(drags, friction, 0.0)
     bearing = np.flatnonzero(bears)
     # each joint that no stop holds has its phalanx on the rock
-    A = joined[np.ix_(free, bearing)]
+    A, share = joined[np.ix_(free, bearing)], hand.postures.bearing_shares[finger, bearing, None]
+    # what locked joints carried beside their contacts, these bear in the same shares
+    locked = (1.0 - share) * normals[free, bearing, None] * pressed[bearing]
+    A = share * A + np.diag((1.0 - share[:, 0]) * np.diag(A))
     try:
-        found = np.linalg.solve(A, (before - shears @ loads[on, 0])[free])
+        found = np.linalg.solve(A, share * (before - shears @ loads[on, 0])[free] + locked)
     except np.linalg.LinAlgError:
         return None
     loads[on[bearing], 1] = found

@@ -40,12 +40,13 @@ __all__ = ["ClosedFingers", "close_fingers", "load_closing"]
 FingerNumbers = list[float]
 """Numbers of a closed finger, phalanx by phalanx: three times the `PHALANX_NUMBERS`."""
 
-PHALANX_NUMBERS: Final = 23
+PHALANX_NUMBERS: Final = 24
 """Numbers of a phalanx: its angle [rad], its contact's place along and above it [m] and tilt [rad],
 its joint [m]; its shear and normal load, each at zero tension [N] and per newton; the share of its
 tile's spines that are on the rock; the codes of its contact and its joint's stop; and in the
 finger's plane, each in homogeneous coordinates, its contact and its axes of shear and of normal
-load; and how far its contact is from that plane, along the finger's y [m]."""
+load; how far its contact is from that plane, along the finger's y [m]; and the share of what
+balances its joint that it bears."""
 
 
 class ClosedFingers:
@@ -95,7 +96,8 @@ class ClosedFingers:
         angle, along, rise, tilt = (table[..., i] for i in range(4))
         joint, share = table[..., 4:6].view(complex)[..., 0], table[..., 10]
         self.postures = HandPostures(
-            angle, joint, along, rise, tilt, share, codes[..., 0], codes[..., 1], table[..., 22]
+            *(angle, joint, along, rise, tilt, share, codes[..., 0], codes[..., 1]),
+            *(table[..., 22], table[..., 23]),
         )
 
     def stops_of(self, index: int) -> tuple[tuple[int, int, Array], ...]:
@@ -276,7 +278,7 @@ def _row(
         # the tile of a phalanx that is laid is on the rock with all its spines
         row += (angle, along, 0.0, 0.0, joint.real, joint.imag)
         row += (t.real, t.imag, n.real, n.imag, 1.0, *laid)
-        row += (place.real, place.imag, 1.0, -u.real, -u.imag, 0.0, -u.imag, u.real, 0.0, 0.0)
+        row += (place.real, place.imag, 1.0, -u.real, -u.imag, 0.0, -u.imag, u.real, 0.0, 0.0, 1.0)
     return row
 
 
@@ -296,5 +298,5 @@ def _row_alone(closed: ClosedFinger) -> FingerNumbers:
         row += (contact.angle, contact.along, contact.rise, contact.tilt, *contact.joint)
         kind, stop = CONTACT_KINDS.index(contact.kind), JOINT_STOPS.index(contact.stop)
         row += (*shear, *normal, share, kind, stop)
-        row += (*place, 1.0, -x, -z, 0.0, -z, x, 0.0, contact.across)
+        row += (*place, 1.0, -x, -z, 0.0, -z, x, 0.0, contact.across, contact.bearing_share)
     return row

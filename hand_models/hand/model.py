@@ -83,11 +83,7 @@ class HandModel:
         self.tendon_friction = table.scalar("tendon", "holding_friction")
         self.spine_travel = table.scalar("tile", "spine_travel")
         self.engagement_exponent = table.positive("tile", "engagement_exponent")
-        self.least_share = table.positive("tile", "least_share")
-        if self.least_share > 1.0:
-            raise InvalidInputError(
-                f"must be in (0, 1], got {self.least_share:g}", field="tile.least_share"
-            )
+        self.least_share = self.finger.least_share
         self.rock_stiffness_ratio = table.positive("tile", "rock_stiffness_ratio")
         self.largest_tile_stretch = table.positive("tile", "largest_tile_stretch")
         self.lateral_stiffness = table.positive("tile", "lateral_stiffness")

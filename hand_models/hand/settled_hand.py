@@ -42,6 +42,8 @@ class HandPostures(NamedTuple):
         Codes: indices into `CONTACT_NAMES`, and into `hand_models.finger.JOINT_STOPS`.
     across : ndarray
         Distance of each contact from its finger's plane [m].
+    bearing_shares : ndarray
+        Share of what balances its joint that each contact bears (`Contact`).
     """
 
     angles: Array
@@ -53,6 +55,7 @@ class HandPostures(NamedTuple):
     kinds: NDArray[np.int8]
     stops: NDArray[np.int8]
     across: Array
+    bearing_shares: Array
 
     def fingers(self, model: FingerModel) -> tuple[SettledFinger, ...]:
         """Return the four fingers in the order of `FINGERS`; ``model``: numbers of a finger."""
@@ -68,10 +71,9 @@ class HandPostures(NamedTuple):
                         JOINT_STOPS[stop],
                         rise,
                         tilt,
-                        share,
-                        across,
+                        *(share, across, bearing),
                     )
-                    for angle, joint, along, rise, tilt, share, kind, stop, across in zip(
+                    for angle, joint, along, rise, tilt, share, kind, stop, across, bearing in zip(
                         *finger, strict=True
                     )
                 ),

@@ -12,7 +12,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices, compiled
 
-__all__ = ["depths_behind", "facing_triangles", "heights_across", "rock_ends"]
+__all__ = ["depths_behind", "facing_triangles", "heights_across", "line_depths", "rock_ends"]
 
 Point = tuple[float, float, float]
 
@@ -161,68 +161,121 @@ def heights_across(triangles: Array, s: Array, halves: Array, lines: Array, slac
     return least.T.copy()
 
 
-@compiled("f3", "f1", "f0", "f1", "f0")
-def rock_ends(triangles: Array, s: Array, half: float, least: Array, gap: float) -> Array:
-    """Return where the rock in a slab ends, between a place with rock and a neighbour without.
+@compiled()
+def _extend_ends(
+    corners: Array, s: Array, slab: Array, least: Array, gap: float, ends: Array
+) -> None:
+    """Extend the ends of the rock in a slab, (2, g, 2), to where a triangle goes beyond them."""
+    count, per_place = len(s), 1.0 / (s[1] - s[0])
+    for corner in range(3):
+        a, b = corners[corner], corners[(corner + 1) % 3]
+        # the corner, and where the edge leaves the slab
+        for bound in (a[1], slab[0], slab[1]):
+            part = _part(min(a[1], b[1]), max(a[1], b[1]), bound)
+            part = part if a[1] <= b[1] else 1.0 - part
+            part = 0.0 if bound == a[1] else part
+            if not (slab[0] <= bound <= slab[1] and 0.0 <= part <= 1.0):
+                continue
+            at = a[0] + part * (b[0] - a[0])
+            t = a[2] + part * (b[2] - a[2])
+            place = (at - s[0]) * per_place
+            before, after = math.floor(place), math.ceil(place)
+            last = 0 <= before < count - 1 and least[before] < least[before + 1] == math.inf
+            last = last and abs(t - least[before]) <= gap
+            if last and not (at, -t) <= (ends[1, before, 0], -ends[1, before, 1]):
+                ends[1, before, 0], ends[1, before, 1] = at, t
+            first = 0 < after < count and least[after] < least[after - 1] == math.inf
+            first = first and abs(t - least[after]) <= gap
+            if first and not (at, t) >= (ends[0, after, 0], ends[0, after, 1]):
+                ends[0, after, 0], ends[0, after, 1] = at, t
+
+
+@compiled("f3", "f1", "f2", "f2", "f0")
+def rock_ends(triangles: Array, s: Array, slabs: Array, least: Array, gap: float) -> Array:
+    """Return where the rock in slabs ends, between a place with rock and a neighbour without.
 
     Parameters
     ----------
     triangles, s
         As of `heights_across`.
-    half : float
-        Half the width of the slab [m].
-    least : ndarray, shape (g,)
-        Least t in the slab at these places, infinite without rock [m].
+    slabs : ndarray, shape (h, 2)
+        y of each slab's two sides; the same for a line [m].
+    least : ndarray, shape (h, g)
+        Least t in each slab at these places, infinite without rock [m].
     gap : float
         Largest difference of an end's t from that of the place beside it [m].
 
     Returns
     -------
-    ndarray, shape (2, g, 2)
+    ndarray, shape (h, 2, g, 2)
         (s, t) of the end before each place and of that after it; NaN where there is none [m].
     """
-    count = len(s)
-    ends, per_place = np.full((2, count, 2), math.nan), 1.0 / (s[1] - s[0])
+    count, per_place = len(s), 1.0 / (s[1] - s[0])
+    found = np.full((len(slabs), 2, count, 2), math.nan)
     # steps from rock to none or back, up to each place
-    changes = np.zeros(count + 1, np.intp)
+    changes = np.zeros((count + 1, len(slabs)), np.intp)
     for i in range(count - 1):
-        changes[i + 1] = changes[i] + ((least[i] < math.inf) != (least[i + 1] < math.inf))
+        for k in range(len(slabs)):
+            step = (least[k, i] < math.inf) != (least[k, i + 1] < math.inf)
+            changes[i + 1, k] = changes[i, k] + step
     changes[count] = changes[count - 1]
     for corners in triangles:
         low = min(corners[0, 0], corners[1, 0], corners[2, 0])
         high = max(corners[0, 0], corners[1, 0], corners[2, 0])
         begin = min(max(math.floor((low - s[0]) * per_place) - 1, 0), count)
         end = min(max(math.ceil((high - s[0]) * per_place) + 1, 0), count)
-        if changes[begin] == changes[end]:
-            continue
-        for corner in range(3):
-            a, b = corners[corner], corners[(corner + 1) % 3]
-            # the corner, and where the edge leaves the slab
-            for bound in (a[1], -half, half):
-                part = _part(min(a[1], b[1]), max(a[1], b[1]), bound)
-                part = part if a[1] <= b[1] else 1.0 - part
-                part = 0.0 if bound == a[1] else part
-                if not (-half <= bound <= half and 0.0 <= part <= 1.0):
+        for k in range(len(slabs)):
+            if changes[begin, k] != changes[end, k]:
+                _extend_ends(corners, s, slabs[k], least[k], gap, found[k])
+    return found
+
+
+@compiled("f2", "f1", "f1", "f4")
+def line_depths(lines: Array, envelope: Array, s: Array, ends: Array) -> Array:
+    """Return how far rock on lines across a finger is behind its envelope.
+
+    Beyond the end of a line's rock, that end is what is nearest: as far again as it is along s.
+
+    Parameters
+    ----------
+    lines, envelope : ndarray, shapes (k, g) and (g,)
+        t of the rock on each line, and of the envelope; infinite without rock [m].
+    s : ndarray, shape (g,)
+        Places in equal steps, ascending [m].
+    ends : ndarray, shape (k, 2, g, 2)
+        Ends of the rock on each line, as from `rock_ends` [m].
+
+    Returns
+    -------
+    ndarray, shape (k, g)
+        Infinite for a line without rock [m].
+    """
+    found, count = np.full(lines.shape, math.inf), len(s)
+    for k in range(len(lines)):
+        for way in (1, -1):
+            # depth at the last end, and where that is
+            depth, last = math.inf, 0.0
+            for step in range(count):
+                i = step if way > 0 else count - 1 - step
+                beside = i + way
+                if lines[k, i] == math.inf:
+                    found[k, i] = min(found[k, i], depth + abs(s[i] - last))
                     continue
-                at = a[0] + part * (b[0] - a[0])
-                t = a[2] + part * (b[2] - a[2])
-                place = (at - s[0]) * per_place
-                before, after = math.floor(place), math.ceil(place)
-                last = 0 <= before < count - 1 and least[before] < least[before + 1] == math.inf
-                last = last and abs(t - least[before]) <= gap
-                if last and not (at, -t) <= (ends[1, before, 0], -ends[1, before, 1]):
-                    ends[1, before, 0], ends[1, before, 1] = at, t
-                first = 0 < after < count and least[after] < least[after - 1] == math.inf
-                first = first and abs(t - least[after]) <= gap
-                if first and not (at, t) >= (ends[0, after, 0], ends[0, after, 1]):
-                    ends[0, after, 0], ends[0, after, 1] = at, t
-    return ends
+                found[k, i] = max(lines[k, i] - envelope[i], 0.0)
+                if 0 <= beside < count and lines[k, beside] == math.inf:
+                    depth, last = found[k, i], s[i]
+                    end = ends[k, 1 if way > 0 else 0, i]
+                    if not math.isnan(end[0]):
+                        last, there = end[0], envelope[i]
+                        if envelope[beside] < math.inf:
+                            part = abs(last - s[i]) / abs(s[beside] - s[i])
+                            there += part * (envelope[beside] - there)
+                        depth = max(end[1] - there, 0.0)
+    return found
 
 
-@compiled("f2", "i1", "f1", "f1", "f2", "f0")
-def depths_behind(
-    points: Array, stops: Indices, s: Array, envelope: Array, lines: Array, least: float
-) -> Array:
+@compiled("f2", "i1", "f1", "f2", "f0")
+def depths_behind(points: Array, stops: Indices, s: Array, depths: Array, least: float) -> Array:
     """Return how far rock on k lines along a finger lies behind an envelope, at n points of it.
 
     Parameters
@@ -231,8 +284,8 @@ def depths_behind(
         Points (s, t) of the envelope's smoothed outlines [m], and the index at which each ends.
     s : ndarray, shape (g,)
         Places in equal steps, ascending [m].
-    envelope, lines : ndarray, shapes (g,) and (k, g)
-        t of the envelope and of the lines' rock at these places; infinite without rock [m].
+    depths : ndarray, shape (k, g)
+        How far the rock on each line is behind the envelope along t; infinite without rock [m].
     least : float
         Least cosine of the angle between t and the outlines' normals.
 
@@ -241,7 +294,7 @@ def depths_behind(
     ndarray, shape (n, k)
         Depths along the outlines' normals; infinite without rock [m].
     """
-    behind, begin = np.full((len(points), len(lines)), math.inf), 0
+    behind, begin = np.full((len(points), len(depths)), math.inf), 0
     for stop in stops:
         for i in range(begin, stop):
             a, b = points[max(i - 1, begin)], points[min(i + 1, stop - 1)]
@@ -249,10 +302,10 @@ def depths_behind(
             upright = max(along / math.sqrt(along * along + into * into), least)
             place = (points[i, 0] - s[0]) / (s[1] - s[0])
             at = min(max(int(place), 0), len(s) - 2)
-            for k in range(len(lines)):
-                depth, after = lines[k, at] - envelope[at], lines[k, at + 1] - envelope[at + 1]
-                depth += (place - at) * (after - depth)
+            for k in range(len(depths)):
+                depth = depths[k, at]
+                depth += (place - at) * (depths[k, at + 1] - depth)
                 if np.isfinite(depth):
-                    behind[i, k] = max(depth, 0.0) * upright
+                    behind[i, k] = depth * upright
         begin = stop
     return behind

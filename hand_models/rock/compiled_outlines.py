@@ -1,4 +1,4 @@
-"""Outlines as seen in the plane of a finger, and the envelope across the finger (compiled).
+"""Outlines as seen in the reach and plane of a finger, and the envelope across it (compiled).
 
 Coordinates (s, t) of a finger's plane: s along the finger, t into the rock. Rock is seen along t.
 Several polylines are an array of their points, one after another, and the index at which each ends.
@@ -12,7 +12,79 @@ import numpy as np
 
 from hand_models.base import Array, Indices, compiled
 
-__all__ = ["least_heights", "raised_outlines", "seen_corners", "seen_outlines"]
+__all__ = ["least_heights", "raised_outlines", "reached", "seen_corners", "seen_outlines"]
+
+
+@compiled()
+def _parts_within(a: Array, b: Array, reach: float) -> tuple[float, float]:
+    """Return from where to where, in parts of it, a segment is within the square; last if none."""
+    first, last = 0.0, 1.0
+    for k in range(2):
+        step = b[k] - a[k]
+        if max(abs(a[k]), abs(b[k])) <= reach:
+            continue
+        if step != 0.0:
+            low, high = (-reach - a[k]) / step, (reach - a[k]) / step
+            first, last = max(first, min(low, high)), min(last, max(low, high))
+        elif abs(a[k]) > reach:
+            first, last = math.inf, -math.inf
+    return first, last
+
+
+@compiled("f2", "i1", "f0")
+def reached(points: Array, stops: Indices, reach: float) -> tuple[Array, Indices, float]:
+    """Return the parts of polylines within a square, and the sum of their lengths [m].
+
+    Polylines, given and returned, are points (s, t), shape (p, 2) [m], and the index at which each
+    ends; the square is |s|, |t| ≤ ``reach`` [m].
+    """
+    found, ends = np.empty((3 * len(points), 2)), np.empty(len(points) + len(stops), dtype=np.intp)
+    total = runs = start = 0
+    for stop in stops:
+        piece = points[start:stop]
+        start = stop
+        outside = -1
+        for i in range(len(piece)):
+            if outside < 0 and max(abs(piece[i, 0]), abs(piece[i, 1])) > reach:
+                outside = i
+        if outside < 0:
+            found[total : total + len(piece)] = piece
+            total += len(piece)
+            ends[runs] = total
+            runs += 1
+            continue
+        # begin a ring where nothing is cut apart that belongs together
+        ring = piece[0, 0] == piece[-1, 0] and piece[0, 1] == piece[-1, 1]
+        turn, around = (outside, len(piece) - 1) if ring else (0, len(piece))
+        through = 0.0
+        inside = False
+        for i in range(len(piece) - 1):
+            a, b = piece[(i + turn) % around], piece[(i + turn + 1) % around]
+            first, last = _parts_within(a, b, reach)
+            if inside and (first > 0.0 or through < 1.0):
+                inside = False
+                ends[runs] = total
+                runs += 1
+            through = last
+            if first >= last:
+                continue
+            if not inside:
+                found[total] = a + first * (b - a)
+                total += 1
+            inside = True
+            for k in range(2):
+                found[total, k] = a[k] + last * (b[k] - a[k]) if last < 1.0 else b[k]
+            total += 1
+        if inside:
+            ends[runs] = total
+            runs += 1
+    length = 0.0
+    start = 0
+    for end in ends[:runs]:
+        for i in range(start, end - 1):
+            length += math.hypot(found[i + 1, 0] - found[i, 0], found[i + 1, 1] - found[i, 1])
+        start = end
+    return found[:total], ends[:runs], length
 
 
 @compiled("f2", "i1")
@@ -124,6 +196,17 @@ def seen_corners(points: Array, stops: Indices, slack: float) -> Array:
     return points[order[seen]]
 
 
+@compiled()
+def _part(low: float, high: float, here: float) -> float:
+    return min(max((here - low) / (high - low), 0.0), 1.0) if high > low else 0.0
+
+
+@compiled()
+def _raised(t: float, own: float, least: float) -> float:
+    """Return t raised as the plane's rock beside it is; no farther than what is where it ended."""
+    return t - (own - least) if own < math.inf else min(t, least)
+
+
 @compiled("f2", "f1", "f1", "f1", "f3", "f0", "f0")
 def raised_outlines(
     points: Array, s: Array, own: Array, least: Array, ends: Array, gap: float, slack: float
@@ -162,20 +245,19 @@ def raised_outlines(
         while corner < len(points) and points[corner, 0] < s[i]:
             here, t = points[corner]
             corner += 1
-            # by how much the plane is raised beside it, or what stands out where it has no rock
-            weights, raised, level = np.zeros(2), 0.0, 0.0
-            for side in (i - 1, i):
-                if side >= 0 and least[side] < math.inf:
-                    near = max(1.0 - abs(here - s[side]) / (s[1] - s[0]), 1e-12)
-                    weights[1] += near
-                    level += near * least[side]
-                    if own[side] < math.inf:
-                        weights[0] += near
-                        raised += near * (own[side] - least[side])
-            if weights[1] > 0.0:
-                known = weights[0] > 0.0
-                t = t - raised / weights[0] if known else min(t, level / weights[1])
-                found[total, 0], found[total, 1] = here, t
+            # the envelope on both sides: at a place with rock, or where it ends before the next
+            low, high, before, after = math.nan, math.nan, 0.0, 0.0
+            if not alone:
+                low, before = s[i - 1], _raised(t, own[i - 1], least[i - 1])
+            elif rock and not np.isnan(ends[0, i, 0]):
+                low, before = ends[0, i, 0], min(t, ends[0, i, 1])
+            if rock:
+                high, after = s[i], _raised(t, own[i], least[i])
+            elif not alone and not np.isnan(ends[1, i - 1, 0]):
+                high, after = ends[1, i - 1, 0], min(t, ends[1, i - 1, 1])
+            if not np.isnan(low) or not np.isnan(high):
+                part = 0.0 if np.isnan(high) else 1.0 if np.isnan(low) else _part(low, high, here)
+                found[total, 0], found[total, 1] = here, before + part * (after - before)
                 total += 1
         if rock:
             found[total, 0], found[total, 1] = s[i], least[i]

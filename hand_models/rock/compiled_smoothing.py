@@ -1,7 +1,6 @@
-"""Trim a cut through rock to a finger's reach, and smooth it to a tile's scale (compiled).
+"""Smooth a cut through rock to the scale of a tile (compiled).
 
-What is computed, and why, is in `hand_models.rock.smoothing`. Several polylines are an array of
-their points, one after another, and the index at which each ends.
+What is computed, and why, is in `hand_models.rock.smoothing`.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices, compiled
 
-__all__ = ["corners", "reached", "smoothed", "without_repeats"]
+__all__ = ["corners", "smoothed", "without_repeats"]
 
 
 @compiled()
@@ -68,85 +67,18 @@ def corners(points: Array) -> tuple[Array, Array]:
 
 
 @compiled()
-def _parts_within(a: Array, b: Array, reach: float) -> tuple[float, float]:
-    """Return from where to where, in parts of it, a segment is within the square; last if none."""
-    first, last = 0.0, 1.0
-    for k in range(2):
-        step = b[k] - a[k]
-        if max(abs(a[k]), abs(b[k])) <= reach:
-            continue
-        if step != 0.0:
-            low, high = (-reach - a[k]) / step, (reach - a[k]) / step
-            first, last = max(first, min(low, high)), min(last, max(low, high))
-        elif abs(a[k]) > reach:
-            first, last = math.inf, -math.inf
-    return first, last
+def _sampled(
+    points: Array, lengths: Array, step: float, first: int, last: int, shift: float
+) -> Array:
+    """Return places of a polyline at steps of its length; beyond a ring's ends it goes on.
 
-
-@compiled("f2", "i1", "f0")
-def reached(points: Array, stops: Indices, reach: float) -> tuple[Array, Indices, float]:
-    """Return the parts of polylines within a square, and the sum of their lengths [m].
-
-    Polylines, given and returned, are points (s, t), shape (p, 2) [m], and the index at which each
-    ends; the square is |s|, |t| ≤ ``reach`` [m].
+    ``shift``: how many steps later they are than at whole steps from the polyline's beginning.
     """
-    found, ends = np.empty((3 * len(points), 2)), np.empty(len(points) + len(stops), dtype=np.intp)
-    total = runs = start = 0
-    for stop in stops:
-        piece = points[start:stop]
-        start = stop
-        outside = -1
-        for i in range(len(piece)):
-            if outside < 0 and max(abs(piece[i, 0]), abs(piece[i, 1])) > reach:
-                outside = i
-        if outside < 0:
-            found[total : total + len(piece)] = piece
-            total += len(piece)
-            ends[runs] = total
-            runs += 1
-            continue
-        # begin a ring where nothing is cut apart that belongs together
-        ring = piece[0, 0] == piece[-1, 0] and piece[0, 1] == piece[-1, 1]
-        turn, around = (outside, len(piece) - 1) if ring else (0, len(piece))
-        through = 0.0
-        inside = False
-        for i in range(len(piece) - 1):
-            a, b = piece[(i + turn) % around], piece[(i + turn + 1) % around]
-            first, last = _parts_within(a, b, reach)
-            if inside and (first > 0.0 or through < 1.0):
-                inside = False
-                ends[runs] = total
-                runs += 1
-            through = last
-            if first >= last:
-                continue
-            if not inside:
-                found[total] = a + first * (b - a)
-                total += 1
-            inside = True
-            for k in range(2):
-                found[total, k] = a[k] + last * (b[k] - a[k]) if last < 1.0 else b[k]
-            total += 1
-        if inside:
-            ends[runs] = total
-            runs += 1
-    length = 0.0
-    start = 0
-    for end in ends[:runs]:
-        for i in range(start, end - 1):
-            length += _distance(found[i], found[i + 1])
-        start = end
-    return found[:total], ends[:runs], length
-
-
-@compiled()
-def _sampled(points: Array, lengths: Array, step: float, first: int, last: int) -> Array:
-    """Return places of a polyline at steps of its length; beyond a ring's ends it goes on."""
     total = lengths[-1]
     found = np.empty((last - first, 2))
     place = 0
     for i in range(len(found)):
-        at = step * (first + i)
+        at = step * (first + i + shift)
         if first < 0:
             at %= total
         if at < lengths[place]:
@@ -184,8 +116,42 @@ def _fitted(curve: Array, weights: Array) -> Array:
 
 
 @compiled()
-def _outward(curve: Array, closed: int) -> Array:
-    """Return unit normals on the right of a curve, shape (n, 2)."""
+def _end_fitted(curve: Array, window: Array, wide: Array, rest: float) -> None:
+    """Write the last points of a fitted curve, and its end: of one parabola up to the very end.
+
+    Parameters
+    ----------
+    curve : ndarray, shape (n + 1, 2)
+        Fitted points at whole steps, and the end of the curve, changed in place.
+    window : ndarray, shape (2 h + 1, 2)
+        Places of the polyline at whole steps before its end, the last at the end.
+    wide : ndarray, shape (2 h + 1, 2 h + 1)
+        Weights as of `smoothed`.
+    rest : float
+        Length from the last whole step to the end, in steps.
+    """
+    half = len(wide) // 2
+    # the parabola at its beginning, its middle and its end
+    nodes = np.zeros((3, 2))
+    for i in range(3):
+        for k in range(len(wide)):
+            for j in range(2):
+                nodes[i, j] += wide[i * half, k] * window[k, j]
+    last = len(curve) - 1
+    for i in range(half + 1):
+        # whole steps before the end, in parts of half the window
+        u = 1.0 - (i - 1.0 + rest) / half if i else 1.0
+        for j in range(2):
+            bend = 0.5 * (nodes[0, j] + nodes[2, j]) - nodes[1, j]
+            curve[last - i, j] = nodes[1, j] + u * (0.5 * (nodes[2, j] - nodes[0, j]) + u * bend)
+
+
+@compiled()
+def _outward(curve: Array, closed: int, rest: float) -> Array:
+    """Return unit normals on the right of a curve, shape (n, 2).
+
+    ``rest``: length of the last step, in steps; 0 if it is whole.
+    """
     count = len(curve)
     normals = np.empty((count, 2))
     for i in range(count):
@@ -195,6 +161,12 @@ def _outward(curve: Array, closed: int) -> Array:
         a, b = curve[max(before, 0)], curve[min(after, count - 1)]
         length = max(_distance(a, b), 1e-300)
         normals[i, 0], normals[i, 1] = (b[1] - a[1]) / length, (a[0] - b[0]) / length
+    if rest > 0.0:
+        # the last step may be next to nothing: over a whole one
+        a = rest * curve[count - 2] + (1.0 - rest) * curve[count - 3]
+        length = max(_distance(a, curve[-1]), 1e-300)
+        normals[-1, 0] = (curve[-1, 1] - a[1]) / length
+        normals[-1, 1] = (a[0] - curve[-1, 0]) / length
     return normals
 
 
@@ -214,12 +186,13 @@ def _foot(curve: Array, at: int, x: float, y: float) -> float:
 
 
 @compiled()
-def _excess(curve: Array, outward: Array, raw: Array, guesses: Indices) -> Array:
+def _excess(curve: Array, outward: Array, raw: Array, guesses: Indices, rest: float) -> Array:
     """Return how far raw points stand out of a curve, by the steps of it that are nearest to them.
 
     ``guesses``: for each raw point a point of the curve that is near it. Rows of the result, for
     each step from one point of the curve to the next: the largest excess, and the largest part of
     it that counts at the step's beginning and at its end, as far as it is from the other.
+    ``rest``: length of the last step, in steps; 0 if it is whole.
     """
     count, last = len(curve), curve[-1]
     longest = 1e-9  # [m] or else the longest step of the curve
@@ -263,6 +236,9 @@ def _excess(curve: Array, outward: Array, raw: Array, guesses: Indices) -> Array
             foot = curve[step, k] + part * (curve[after, k] - curve[step, k])
             normal = outward[step, k] + part * (outward[after, k] - outward[step, k])
             out += (raw[i, k] - foot) * normal
+        if rest > 0.0 and step >= count - 2:
+            # the end belongs to the step before it, which is shorter
+            part, step = rest * (part if step == count - 2 else 1.0), count - 2
         excess[0, step] = max(excess[0, step], out)
         excess[1, step] = max(excess[1, step], (1.0 - part) * out)
         excess[2, step] = max(excess[2, step], part * out)
@@ -308,6 +284,14 @@ def _mean(values: Array, part: int, closed: int) -> Array:
     return found
 
 
+@compiled()
+def _at_end(values: Array, rest: float) -> Array:
+    """Return values at whole steps with the last, one step too far, taken back to the end."""
+    if rest > 0.0:
+        values[-1] = (1.0 - rest) * values[-2] + rest * values[-1]
+    return values
+
+
 @compiled("f2", "f1", "f0", "i0", "f0", "i0", "f2", "f2")
 def smoothed(
     points: Array,
@@ -330,8 +314,9 @@ def smoothed(
     count : int
         Number of points at equal steps.
     rest : float
-        Length from the last of them to the polyline's end, in steps: the curve goes on straight
-        by as much; 0 for none.
+        Length from the last of them to the polyline's end, in steps; 0 for none. The curve goes on
+        to that end: with the parabola that is fitted to the polyline's last stretch, up to its very
+        end, so that no point jumps when the polyline grows by one step more.
     closed : int
         1 if the polyline is a ring, else 0.
     wide, narrow : ndarray
@@ -339,13 +324,23 @@ def smoothed(
     """
     half = len(wide) // 2
     over = 2 * half if closed else 0
-    sampled = _sampled(points, lengths, step, -over, count + over)
-    fitted = _fitted(_fitted(sampled, wide), narrow)
+    sampled = _sampled(points, lengths, step, -over, count + over, 0.0)
     more = 1 if rest > 0.0 else 0
     curve = np.empty((count + more, 2))
-    curve[:count] = fitted[over : over + count]
-    if more:
-        curve[count] = curve[count - 1] + rest * (curve[count - 1] - curve[count - 2])
+    once = _fitted(sampled, wide)
+    if more and half:
+        window = _sampled(points, lengths, step, count - 1 - 2 * half, count, rest)
+        curve[:count] = once
+        _end_fitted(curve, window, wide, rest)
+        once[:] = curve[:count]
+        curve[:count] = _fitted(once, narrow)
+        for i in range(count - len(narrow) // 2, count):
+            # of a parabola through points of a parabola nothing changes
+            curve[i] = once[i]
+    else:
+        curve[:count] = _fitted(once, narrow)[over : over + count]
+        if more:
+            curve[count] = points[-1]
     raw = np.concatenate((sampled[over : over + count], points))
     guesses = np.empty(len(raw), dtype=np.intp)
     for i in range(count):
@@ -353,13 +348,14 @@ def smoothed(
     for i in range(len(points)):
         guesses[count + i] = min(int(lengths[i] / step), count - 1)
     for _ in range(4):  # each time far less is left
-        outward = _outward(curve, closed)
-        excess = _excess(curve, outward, raw, guesses)
+        outward = _outward(curve, closed, rest)
+        excess = _excess(curve, outward, raw, guesses, rest)
         if excess[0].max() <= 1e-6:  # [m]
             break
         # two moving means whose widths add up to that of the maximum leave no point below it
-        rise = _highest(excess, half, closed)
-        rise = _mean(_mean(rise, half // 2, closed), half - half // 2, closed)
+        rise = _at_end(_highest(excess, half, closed), rest)
+        rise = _at_end(_mean(rise, half // 2, closed), rest)
+        rise = _at_end(_mean(rise, half - half // 2, closed), rest)
         for i in range(len(curve)):
             for k in range(2):
                 curve[i, k] += rise[i] * outward[i, k]

@@ -189,7 +189,7 @@ def _weights(part: int) -> Array:
 
 def _reached(pieces: Sequence[Array], scale: Scale) -> list[Array]:
     """Return the parts of polylines within the square |s|, |t| ≤ reach."""
-    from hand_models.rock.compiled_smoothing import reached
+    from hand_models.rock.compiled_outlines import reached
 
     if not pieces:
         return []
@@ -220,6 +220,8 @@ class Heights(NamedTuple):
     tile_ends, frame_ends : ndarray, shape (2, g, 2)
         Ends (s, t) of the rock before and after each place, across the tiles and across the
         frames, from `rock_ends`; NaN where the rock does not end there [m].
+    line_ends : ndarray, shape (k, 2, g, 2)
+        The same for each strip's middle.
     """
 
     tile: Array
@@ -227,17 +229,21 @@ class Heights(NamedTuple):
     lines: Array
     tile_ends: Array
     frame_ends: Array
+    line_ends: Array
 
 
 def _strips(scale: Scale, heights: Heights, section: PolylineSection | None) -> RockStrips:
     """Return how far the rock of each strip under a finger's tiles lies behind their envelope."""
+    from hand_models.rock.compiled_heights import depths_behind, line_depths
+
     if section is None:
         return NO_STRIPS
-    from hand_models.rock.compiled_heights import depths_behind
-
+    if np.isfinite(heights.lines).all():
+        depths = np.maximum(heights.lines - heights.tile, 0.0)
+    else:
+        depths = line_depths(heights.lines, heights.tile, scale.places, heights.line_ends)
     points, stops = strung(section.pieces)
-    least = BASE_TOLERANCES.angle
-    behind = depths_behind(points, stops, scale.places, heights.tile, heights.lines, least)
+    behind = depths_behind(points, stops, scale.places, depths, BASE_TOLERANCES.angle)
     return RockStrips(scale.lines, points.view(complex)[:, 0], behind)
 
 
@@ -326,11 +332,11 @@ class OutlinedHold(Hold):
         halves = 0.5 * np.array([scale.tile_width, scale.frame_width])
         seen = facing_triangles(*triangles, some, plane, float(halves.max()), scale.reach)
         least = heights_across(seen, s, halves, scale.lines, BASE_TOLERANCES.length)
-        ends = np.full((2, 2, len(s), 2), np.nan)
-        for row, half in enumerate(halves.tolist()):
-            if not np.isfinite(least[row]).all():
-                ends[row] = rock_ends(seen, s, half, least[row], scale.bridged_gap)
-        return Heights(least[0], least[1], least[2:], ends[0], ends[1])
+        slabs = np.concatenate([np.outer(halves, [-1.0, 1.0]), scale.lines[:, None].repeat(2, 1)])
+        ends = np.full((len(least), 2, len(s), 2), np.nan)
+        if not np.isfinite(least).all():
+            ends = rock_ends(seen, s, slabs, least, scale.bridged_gap)
+        return Heights(least[0], least[1], least[2:], ends[0], ends[1], ends[2:])
 
     @abstractmethod
     def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:

@@ -272,6 +272,11 @@ class HandBatch:
         """Mechanical stop that each finger joint is at, as codes of `JOINT_STOPS`, shape (F, 3)."""
         return concatenated([hand.postures.stops for hand in self.hands])
 
+    @property
+    def bearing_shares(self) -> Array:
+        """Share of what balances its joint that each contact bears, shape (F, 3)."""
+        return concatenated([hand.postures.bearing_shares for hand in self.hands])
+
 
 def concatenated(parts: Sequence[NDArray[Number]]) -> NDArray[Number]:
     """Concatenate arrays of all hands along the first axis."""

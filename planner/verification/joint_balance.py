@@ -16,6 +16,8 @@ a wrench (F, M) about the origin of H: with a across the finger, a × p = a × p
 a joint at (x, z) of the finger's plane. Nothing is shared with the computation of the affine maps
 of settled hands (Eq. 14): the balance itself is solved, once for hands at rest, whose loads are
 affine in the tensions. A tile that has slipped has the shear μ N of friction, N its normal load.
+A contact of few spines across a gap bears the share w of what balances its joint, and the joint,
+which is taken as locked, the rest (`hand_models.finger.Contact`).
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import SKEW_MATRICES, Array
+from hand_models.base import SKEW_MATRICES, Array, Indices
 from hand_models.finger import JOINT_STOPS, PHALANGES
 from hand_models.hand import HandModel
 from planner.prepare import CONTACT_CODES, HandBatch, TileIndex
@@ -197,6 +199,9 @@ class JointBalance(ResidualLimits):
             self.stop_fingers, self.stop_joints = sides.nonzero()
             self._sides = sides[self.stop_fingers, self.stop_joints]
 
+        # fingers, joints and phalanges of contacts that bear with a locked joint
+        self._few = self._shared_joints()
+
         # two tensions suffice, as shears, normals and balances are affine in them
         ends = self.fingers(np.repeat([[0.0], [1.0]], len(self._pull), axis=1))
         try:
@@ -208,6 +213,19 @@ class JointBalance(ResidualLimits):
         self._at_zero, self._per_newton = np.zeros((2, normals.shape[1], 3))
         self._at_zero[:, :2], self._per_newton[:, :2] = both[0], both[1] - both[0]
         self._left_at_zero, self._left_per_newton = left[0], left[1] - left[0]
+
+    def _shared_joints(self) -> tuple[Indices, Indices, Indices]:
+        """Return finger, joint and phalanx of each contact that bears with a locked joint."""
+        shares = self._known.bearing_shares
+        free = np.ones(shares.shape, dtype=bool) if self.held is None else ~self.held
+        bears = free if self.held is None else self._bears
+        # contacts and the joints that they support, both in their order
+        (fingers, joints), (others, phalanges) = free.nonzero(), bears.nonzero()
+        if not np.array_equal(fingers, others):
+            few = np.zeros(0, dtype=np.intp)
+        else:
+            few = np.flatnonzero(shares[fingers, phalanges] < 1.0)
+        return fingers[few], joints[few], phalanges[few]
 
     def loads(self, tensions: Array, lateral: Array) -> tuple[Array, Array]:
         """Return the tile loads of hands at rest for given tendon tensions.
@@ -306,6 +324,12 @@ class JointBalance(ResidualLimits):
             # in place of the balance of a joint that is held, the normal of what bears nothing is 0
             A[which, held], b[..., which, held] = 0.0, 0.0
             A[which, held, phalanx] = 1.0
+        if len(self._few[0]):
+            few, joint, bearing = self._few
+            share, own = self._known.bearing_shares[few, bearing], A[self._few]
+            A[few, joint] *= share[:, None]
+            A[self._few] += (1.0 - share) * own
+            b[..., few, joint] *= share
         normals = np.linalg.solve(A, b[..., None])
         normal = np.zeros(fingers.shear.shape)
         normal[..., phalanges] = normals[..., 0]

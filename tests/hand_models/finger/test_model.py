@@ -245,6 +245,24 @@ def test_with_its_middle_tile_in_the_air_two_phalanges_become_one_link():
     np.testing.assert_allclose(stop, [0.0, at_stop, 0.0], atol=1e-12)
 
 
+def test_few_spines_across_a_gap_bear_a_share_of_their_joint():
+    """By hand, of a straight finger: the distal joint, taken as locked, carries the rest."""
+    angle, f, r, k = 0.3, 50.0, MODEL.pulley_radii, 0.05
+    for share in (1e-9, 0.3, 1.0):
+        straight = [
+            Contact(angle, (i * L * math.cos(angle), i * L * math.sin(angle)), 0.02, "face")
+            for i in range(3)
+        ]
+        straight[2] = replace(straight[2], engagement=0.1 * share, bearing_share=share)
+        finger = SettledFinger(MODEL, tuple(straight))
+        shear, normal, _ = (v.sum(axis=1) for v in loads(finger, f))
+        distal = share * (f * r[2] - H * shear[2]) / 0.02
+        middle = (f * r[1] - H * (shear[1] + shear[2]) - (L + 0.02) * distal) / 0.02
+        proximal = f * r[0] - k * angle - H * shear.sum()
+        proximal -= (L + 0.02) * middle + (2.0 * L + 0.02) * distal
+        np.testing.assert_allclose(normal, [proximal / 0.02, middle, distal], rtol=1e-9)
+
+
 def test_unloaded_forces_are_those_of_figure_12():
     """Two fingers at 37 N on 300 mm: 14.6° at the base, contact 24.7 mm from the joint."""
     finger = on_circle(0.15, first_angle=math.radians(14.6), model=OF_FIG12)

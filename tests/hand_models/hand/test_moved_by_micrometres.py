@@ -22,19 +22,32 @@ BESIDE = {19: 10, 51: 45, 61: 48, 71: 18, 115: 23, 146: 29}
 """Seeds of hands, and places at which rock was once sampled anew, or joints on their way back to
 the path left spines at a gap that the path does not have."""
 
+AT_ENDS = {31: 44, 35: 25}
+"""Seeds of hands, and places at which a finger's rock, which ends near its tip, once jumped: where
+an outline had one more point, a place along the finger no rock, or a strip no rock any more."""
+
+FEW = {63: 49, 75: 29, 106: 23, 192: 3}
+"""Seeds of hands, and places at which a tile comes within its spines' travel: it once bore its
+whole joint from its first spine on."""
+
+BALANCED = {87: 41, 94: 2, 199: 47}
+"""Seeds of hands, and places at which the tension once grew while joints were leaving a state that
+had lost its stability, so that spines held at a gap that depended on the increments."""
+
 STEP = 0.01
 """Of a support at a micrometre, at most, in parts of its scale."""
 
-JUMPING = 0.1
-"""Share of hands, at most, that have a larger step: a phalanx that comes within its spines' travel
-bears across the gap at once, and where two equilibria are close a finger ends in one or the other.
+STEEP = 0.05
+"""Share of hands, at most, that have a larger step: a tile is pulled off, or a finger snaps, at a
+tension that a micrometre moves past the closing tension or a strength; a bare phalanx leaves the
+rock; or a support changes as fast all the way.
 """
 
 
 def test_at_each_micrometre_contacts_and_supports_are_as_beside_it():
-    for seed, place in (LOST | BESIDE).items():
+    for seed, place in (LOST | BESIDE | AT_ENDS | FEW | BALANCED).items():
         placement, way = random_placement(seed)
-        scan = scanned(placement, way, range(place - 3, place + 4))
+        scan = scanned(placement, way, range(place - 1, place + 3))
         assert scan.flips() == []
         assert scan.steps().max() < STEP
 
@@ -77,8 +90,8 @@ def test_most_hands_hold_alike_at_all_of_61_places():
             flipping.append(seed)
         elif scan.steps().max() > STEP:
             jumping.append(seed)
-    assert len(flipping) <= 1, flipping
-    assert len(jumping) <= JUMPING * 200, jumping
+    assert flipping == []
+    assert len(jumping) <= STEEP * 200, jumping
 
 
 @given_some(2, 8, st.integers(0, 2**32 - 1))

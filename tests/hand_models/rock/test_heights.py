@@ -168,7 +168,7 @@ def test_rock_ends_where_its_triangles_do(turn: float) -> None:
     )
     least = heights(plate, LEVEL)[1]
     seen = facing_triangles(*plate, np.arange(2), LEVEL, half, 0.1)
-    ends = rock_ends(seen, PLACES, half, least, 0.005)
+    (ends,) = rock_ends(seen, PLACES, np.array([[-half, half]]), least[None], 0.005)
     (last,) = np.flatnonzero(~np.isnan(ends[1, :, 0]))
     assert np.isnan(ends[0]).all()
     # its edge is the line s cos + y sin = end

@@ -9,7 +9,7 @@ from hypothesis import given, strategies as st
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import savgol_filter
 
-from hand_models.rock import compiled_smoothing
+from hand_models.rock import compiled_outlines, compiled_smoothing
 from hand_models.rock.smoothing import Scale, smooth
 from hand_models.sections import PolylineSection
 
@@ -50,7 +50,7 @@ def test_a_raw_point_stands_out_of_the_place_of_the_curve_that_is_nearest(seed):
     curve = folded(rng)
     outward = rng.normal(size=curve.shape)
     raw = curve[rng.integers(0, len(curve), 80)] + rng.normal(0.0, 5e-4, (80, 2))
-    excess = compiled_smoothing._excess(curve, outward, raw, rng.integers(0, len(curve), 80))
+    excess = compiled_smoothing._excess(curve, outward, raw, rng.integers(0, len(curve), 80), 0.0)
     got = compiled_smoothing._highest(excess, 24, 0)
     want = raised(*standing_out(curve, outward, raw), len(curve), 24)
     np.testing.assert_allclose(got, want, atol=1e-15)
@@ -68,6 +68,26 @@ def test_a_line_that_begins_a_micrometre_on_is_smoothed_without_a_jump():
         count = min(len(one), len(other)) - 2
         away = PolylineSection([one]).clearances(other[2:count] @ [1.0, 1.0j])
         assert np.abs(away).max() < 1.5e-6
+
+
+def test_a_line_that_grows_by_micrometres_is_smoothed_without_a_jump():
+    """Also where it has one more step than before, every 0.5 mm."""
+    for seed in range(40):
+        rng, scale = np.random.default_rng(seed), Scale.of()
+        line = np.column_stack([np.linspace(0.0, 0.08, 60), np.cumsum(rng.normal(0.0, 4e-4, 60))])
+        onward = np.diff(line[-2:], axis=0)[0]
+        length = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
+        # around where the last step is whole, and some places between
+        whole = math.ceil(length / scale.spacing) * scale.spacing - length
+        grown = whole + 1e-6 * np.append(np.arange(-3.0, 4.0), [101.0, 102.0, 301.0, 302.0])
+        curves = [
+            smooth(np.vstack([line[:-1], line[-1] + far * onward / np.hypot(*onward)]), scale)
+            for far in grown
+        ]
+        for i in (0, 1, 2, 3, 4, 5, 7, 9):
+            for one, other in ((curves[i], curves[i + 1]), (curves[i + 1], curves[i])):
+                away = PolylineSection([one]).clearances(other @ [1.0, 1.0j])
+                assert np.abs(away).max() < 1.5e-6
 
 
 @given(seeds)
@@ -102,7 +122,7 @@ def test_what_is_within_reach_of_a_line_is_cut_where_it_leaves(seed):
     line = np.cumsum(rng.normal(0.0, 0.1, (40, 2)), axis=0)
     if rng.random() < 0.5:
         line = np.vstack([line, line[:1]])
-    points, ends, length = compiled_smoothing.reached(line, np.array([len(line)]), 0.2)
+    points, ends, length = compiled_outlines.reached(line, np.array([len(line)]), 0.2)
     assert np.abs(points).max(initial=0.0) <= 0.2 + 1e-12
     inner = np.delete(np.arange(len(points) - 1), ends[:-1] - 1) if len(points) else []
     steps = [math.dist(points[i], points[i + 1]) for i in inner]

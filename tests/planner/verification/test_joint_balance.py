@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from hand_models.base import Pose
+from hand_models.fixed_wrist import slipped_hand
 from hand_models.rock import Cylinder
 from planner.prepare import HandBatch, prepare_stance, settle_hand
 from planner.result import PlanArrays
@@ -14,6 +16,8 @@ from planner.solving import answer_on
 from planner.verification import Check
 from planner.verification.joint_balance import JointBalance
 from planner.verification.residuals import PartNames
+from tests.suite.helpers.hands import HAND
+from tests.suite.helpers.moved_hands import random_placement
 from tests.suite.helpers.stances import ask, on_wall, random_stance
 
 STANCES = {
@@ -64,6 +68,25 @@ def test_loads_by_equation_14_balance_at_any_tension(stance):
     ]
     pressing = [torque[0] + torque[1] * f[finger] for finger, _, torque in stops]
     np.testing.assert_allclose(balance.stops(left), pressing, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", [63, 75, 106])
+def test_loads_of_few_spines_across_a_gap_balance(seed):
+    """They and a joint that is taken as locked share a balance; so they do when tiles slip."""
+    placement, way = random_placement(seed)
+    few = 0
+    for far in range(0, 60, 10):
+        pose = placement.hold_in_hand
+        there = Pose(pose.position + 1e-6 * far * way, pose.rotation)
+        (hand,) = HAND.settle_each([placement._replace(hold_in_hand=there)])
+        few += (hand.postures.bearing_shares < 1.0).any()
+        for closed in (hand, slipped_hand(hand, np.flatnonzero(hand.touching)[:1].tolist())):
+            balance = balance_of(HandBatch.of([closed]))
+            f = np.array([20.0, 60.0, 120.0, 300.0])
+            found, _ = balance.loads(f, np.zeros(len(closed.tiles)))
+            own = closed.tile_loads(f)
+            np.testing.assert_allclose(found[:, :2], own[:, :2], atol=1e-8)
+    assert few > 0
 
 
 def test_normals_are_those_whose_moments_about_the_joints_are_left():
