@@ -32,7 +32,7 @@ ends where one that is tightened slowly would.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -46,6 +46,7 @@ from hand_models.finger.path_state import (
     SETTINGS_RECORD,
     SHAPE_FIELDS,
     STATE_FIELDS,
+    Balanced,
     Record,
     Records,
 )
@@ -79,20 +80,6 @@ def around_rock(rock: Outlines, shape: PhalanxShape, drive: Records, q: Array) -
     for i, own in enumerate(zip(*rock, strict=True)):
         put_around(SETTINGS_RECORD, bar, drive["depth"][i], q[i], found[i : i + 1], *own)
     return found
-
-
-class Balanced(NamedTuple):
-    """A finger in balance on its path: arrays of one record each.
-
-    Attributes
-    ----------
-    state, around, forces : ndarray, shape (1,)
-        Records of `STATE_FIELDS`, of `AROUND_FIELDS` and of `LINEARISED_FIELDS` there.
-    """
-
-    state: Records
-    around: Records
-    forces: Records
 
 
 def follow(

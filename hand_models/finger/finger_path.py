@@ -26,6 +26,7 @@ from hand_models.finger.closed_finger import starting_angles
 from hand_models.finger.model import FingerModel
 from hand_models.finger.path_state import (
     JOINT_COUNT,
+    Balanced,
     OpenFinger,
     Records,
     drives,
@@ -145,7 +146,7 @@ def _paths(
     model: FingerModel, shape: PhalanxShape, rock: Outlines, drive: Records, start: Records
 ) -> Iterator[FingerPath]:
     """Yield the balanced states of fingers on their paths."""
-    from hand_models.finger.closing import Balanced, follow
+    from hand_models.finger.closing import follow
 
     courses: list[list[Balanced]] = [[] for _ in start]
     _, _, resting = follow(rock, shape, drive, start, courses)

@@ -28,6 +28,7 @@ __all__ = [
     "SETTINGS_RECORD",
     "SHAPE_FIELDS",
     "STATE_FIELDS",
+    "Balanced",
     "OpenFinger",
     "Record",
     "Records",
@@ -125,6 +126,20 @@ finger that opens, the least share of each tile's spines in its balances so far.
 the joints in the last increment [rad]. ``left``: torque residual that the linearisation predicts
 after it [N·m].
 """
+
+
+class Balanced(NamedTuple):
+    """A finger in balance on its path: arrays of one record each.
+
+    Attributes
+    ----------
+    state, around, forces : ndarray, shape (1,)
+        Records of `STATE_FIELDS`, of `AROUND_FIELDS` and, in `contact_states`, `LINEARISED_FIELDS`.
+    """
+
+    state: Records
+    around: Records
+    forces: Records
 
 
 class OpenFinger(NamedTuple):
