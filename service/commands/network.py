@@ -212,7 +212,13 @@ def query_command(
     help="Time of the climb over time that passes; 1 keeps the controller's rates.",
 )
 @click.option("--up-to-failure", is_flag=True, help="Play a climb that ends in the middle, too.")
-@options.wait_option
+@click.option(
+    "--wait",
+    type=options.FiniteRange(0.0, 1e6),
+    metavar="SECONDS",
+    help="Wait so long for a subscriber, the robot's controller; by default "
+    f"{serving.SERVING_SETTINGS.search_timeout:g}.",
+)
 @options.json_option
 def play_command(
     folder: Path,

@@ -72,10 +72,10 @@ def route_command(
     own: options.Own,
     as_json: bool,
 ) -> int:
-    """Evaluate climbs: every stance, and every one with a limb in the air.
+    """Plan climbs: every stage, and every move between two stages.
 
-    ROUTE is the path of a JSON file, - for standard input, the name of a bundled route, or a
-    folder: all files in it that end in .json. Many routes are answered in order, with an error in
+    ROUTE is the path of a JSON or TOML file, - for standard input, the name of a bundled route, or
+    a folder: all files in it that end in .json. Many routes are answered in order, with an error in
     the place of each route that has one.
 
     The exit status of many routes is the worst that one of them has, as for crux batch.
