@@ -40,7 +40,9 @@ def climb_set_points(knots: Sequence[KnotReply], step: float) -> Iterator[ClimbS
         All with the state ``playing``.
     """
     first = knots[0]
-    yield _set_points(first, first, 1.0, first.body, 0)
+    # loads SciPy, for which no set-point after the first one may wait
+    (turn,) = _turns(first, first, np.ones(1))
+    yield _set_points(first, first, 1.0, PlacedFrame(first.body.position, turn), 0)
     number = 0
     for before, knot in pairwise(knots):
         # a step that fits but for rounding counts

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+import sys
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -87,6 +88,12 @@ def test_a_body_turns_the_shortest_way_at_a_constant_rate(knots):
     turns = [Rotation.from_quat(each.body.orientation) for each in points]
     angles = [(turns[0].inv() * turn).as_rotvec() for turn in turns]
     assert np.allclose(angles, np.outer(np.linspace(0.0, 1.0, 11), [0.0, 0.0, 0.4]), atol=1e-9)
+
+
+def test_all_is_loaded_before_the_first_set_points(knots, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.delitem(sys.modules, "scipy.spatial.transform")
+    next(climb_set_points(knots, 0.1))
+    assert "scipy.spatial.transform" in sys.modules
 
 
 def test_knots_at_one_time_follow_each_other(knots):
