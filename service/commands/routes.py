@@ -91,7 +91,7 @@ def route_command(
                     f"is for one route, whose output -o is a folder, got {output}", field=option
                 )
         return _many(_Routes(routes, own), output, resume, parallel, wanted, own, as_json)
-    if len(routes) > 1 or Path(routes[0]).is_dir():
+    if len(routes) > 1 or _is_folder(routes[0]):
         raise InvalidInputError(
             f"{output}: many routes need a file that ends in {LISTED_ENDINGS}", field="-o"
         )
@@ -265,13 +265,18 @@ class _Routes:
                 yield wire.encode_error(error, wire.Format.JSON, known)
 
 
+def _is_folder(source: str) -> bool:
+    """Return whether a folder is meant, not a bundled route whose name a folder has, too."""
+    return Path(source).is_dir() and source not in stances.bundled(requests.RouteRequest)
+
+
 def _files(source: str) -> list[str]:
     """Return the routes of a folder in the order of their names, or the one that is meant."""
     if source == "-":
         raise InvalidInputError(
             "standard input is one route: give it alone, with -o DIR", field="ROUTE"
         )
-    if not Path(source).is_dir():
+    if not _is_folder(source):
         return [source]
     found = sorted(str(path) for path in Path(source).glob("*.json"))
     if not found:
