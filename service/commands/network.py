@@ -252,7 +252,16 @@ def play_command(
             tables.note(f"at speed {speed:g}, tensions and joints exceed the controller's rates")
     serving.start_zenoh_log()
     with serving.open_session(config) as session:
-        sent = serving.play(session, about.robot, knots, rate=rate, speed=speed, wait=wait)
+        delays = [0.0]
+        sent = serving.play(
+            session, about.robot, knots, rate=rate, speed=speed, wait=wait, late=delays.append
+        )
+    # a controller hardly feels less than a period, or 10 ms
+    if not as_json and max(delays) > max(1.0 / rate, 0.01):
+        tables.note(
+            f"set-points were late, one of them by {1e3 * max(delays):.0f} ms: the climb took "
+            f"{sum(delays):.2f} s longer; try a lower --rate, or a machine with less to do"
+        )
     if as_json:
         tables.say({"v": 1, "set_points": sent, "knots": len(knots), "time": duration})
     else:

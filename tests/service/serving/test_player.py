@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import signal
 import sys
+import time
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -127,6 +128,16 @@ def test_a_robot_gets_all_set_points_in_order_and_no_sooner_than_they_should_com
         for old, new in zip(a.hands, b.hands, strict=True)
     ]
     assert max(change) <= max(rates) * 20.0 / 200.0 + 1e-9
+
+
+def test_what_comes_late_is_told(knots, listening, robot, monkeypatch: pytest.MonkeyPatch):
+    slow, delays = time.sleep, []
+    monkeypatch.setattr("time.sleep", lambda seconds: slow(seconds + 0.01))
+    with open_session(client_config(listening[1])) as session:
+        play(session, "robosimian", knots[:3], rate=200.0, wait=10.0, late=delays.append)
+    robot.wait()
+    # a sleep ends 10 ms late, and the next set-points should come 5 ms after
+    assert max(delays) > 0.004
 
 
 def test_nobody_is_played_to_where_nobody_listens(knots):
