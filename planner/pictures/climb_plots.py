@@ -174,8 +174,8 @@ def _draw_margins(axes: Any, climb: Climb) -> None:
         text = textwrap.fill(f"move {climb.failure.move} fails: {climb.failure.reason}", 60)
         box = {"facecolor": "white", "edgecolor": "tab:red"}
         axes.text(
-            0.99 * begun, 0.05 * top, text, ha="right", va="bottom", multialignment="left",
-            fontsize=8, bbox=box,
+            0.98, 0.05, text, transform=axes.transAxes, ha="right", va="bottom",
+            multialignment="left", fontsize=8, bbox=box,
         )  # fmt: skip
     axes.set(xlabel="time [s]", ylabel="utilisation [1]", ylim=(0.0, top))
     axes.set_xlim(times[0], max(times[-1], times[0] + 1e-3))
