@@ -31,21 +31,27 @@ class BranchEndError(InvalidInputError):
         Part of the path that was followed, from 0 to 1.
     lacks : str
         What keeps the limb from going on.
+    shifts : bool
+        Whether the hand stays on its hold, and the body shifts.
 
     Attributes
     ----------
-    limb, share, lacks
+    limb, share, lacks, shifts
         The parameters.
     """
 
     kind = "unreachable"
 
-    def __init__(self, limb: str, share: float, lacks: str) -> None:
+    def __init__(self, limb: str, share: float, lacks: str, shifts: bool = False) -> None:
+        percent = f"{100.0 * share:.0f} %"
         super().__init__(
-            f"{limb} cannot follow its hand's path beyond {100.0 * share:.0f} % of it: {lacks}; "
-            "start from another posture, or choose another path"
+            f"{limb} cannot keep its hold beyond {percent} of the body's shift: {lacks}; shift the "
+            "body less or elsewhere, or start from another posture"
+            if shifts
+            else f"{limb} cannot follow its hand's path beyond {percent} of it: {lacks}; start "
+            "from another posture, or choose another path"
         )
-        self.limb, self.share, self.lacks = limb, share, lacks
+        self.limb, self.share, self.lacks, self.shifts = limb, share, lacks, shifts
 
 
 def pose_between(first: Pose, second: Pose, part: float) -> Pose:
@@ -150,12 +156,15 @@ class _Limb:
             unit = "m" if chain.sliding[i] else "rad"
             stopped.append(f"{chain.joints[i]} is at its limit of {limit:.4g} {unit}")
         if np.linalg.svd(J, compute_uv=False)[-1] < MOTION_SETTINGS.singular:
-            stopped.append("it is stretched or folded, so that the hand cannot move every way")
+            stopped.append("the limb is stretched or folded, so its hand cannot move every way")
         if not stopped:
             step = MOTION_SETTINGS.largest_step
             stopped.append(f"a joint would turn by more than {step:g} rad at once")
         way, turn = np.linalg.norm(error[:3]) * chain.reach, np.linalg.norm(error[3:])
-        return f"{', and '.join(stopped)}, {1e3 * way:.3g} mm and {turn:.2g} rad from the next pose"
+        parts = [(way, f"{1e3 * way:.3g} mm"), (turn, f"{turn:.2g} rad")]
+        # what rounding leaves is no distance
+        off = " and ".join(text for size, text in parts if size > 1e-6) or parts[0][1]
+        return f"{', and '.join(stopped)}, {off} from the next pose"
 
 
 def _least_step(J: Array, error: Array) -> Array:
@@ -247,10 +256,13 @@ def shift_postures(
         If the deadline passes first.
     """
     inverse = [body.inverse() for body in bodies]
-    return {
-        limb: follow_poses(robot, limb, start[limb], [body @ hand for body in inverse])
-        for limb, hand in hands.items()
-    }
+    try:
+        return {
+            limb: follow_poses(robot, limb, start[limb], [body @ hand for body in inverse])
+            for limb, hand in hands.items()
+        }
+    except BranchEndError as error:
+        raise BranchEndError(error.limb, error.share, error.lacks, shifts=True) from None
 
 
 def branches(

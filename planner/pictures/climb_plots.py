@@ -173,7 +173,10 @@ def _draw_margins(axes: Any, climb: Climb) -> None:
     if climb.failure is not None:
         text = textwrap.fill(f"move {climb.failure.move} fails: {climb.failure.reason}", 60)
         box = {"facecolor": "white", "edgecolor": "tab:red"}
-        axes.text(0.99 * begun, 0.05 * top, text, ha="right", va="bottom", fontsize=8, bbox=box)
+        axes.text(
+            0.98, 0.05, text, transform=axes.transAxes, ha="right", va="bottom",
+            multialignment="left", fontsize=8, bbox=box,
+        )  # fmt: skip
     axes.set(xlabel="time [s]", ylabel="utilisation [1]", ylim=(0.0, top))
     axes.set_xlim(times[0], max(times[-1], times[0] + 1e-3))
     axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=10, frameon=False)

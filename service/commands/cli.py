@@ -76,7 +76,7 @@ COMMANDS_BY_NAME: Final = {
     ),
     "route": Entry(
         "routes",
-        "Evaluate climbs: every stance, and every one with a limb in the air.",
+        "Plan climbs: every stage, and every move between two stages.",
     ),
     "schema": Entry("network", "Print the JSON Schema of every message."),
     "screen": Entry(

@@ -212,7 +212,13 @@ def query_command(
     help="Time of the climb over time that passes; 1 keeps the controller's rates.",
 )
 @click.option("--up-to-failure", is_flag=True, help="Play a climb that ends in the middle, too.")
-@options.wait_option
+@click.option(
+    "--wait",
+    type=options.FiniteRange(0.0, 1e6),
+    metavar="SECONDS",
+    help="Wait so long for a subscriber, the robot's controller; by default "
+    f"{serving.SERVING_SETTINGS.search_timeout:g}.",
+)
 @options.json_option
 def play_command(
     folder: Path,
@@ -246,7 +252,16 @@ def play_command(
             tables.note(f"at speed {speed:g}, tensions and joints exceed the controller's rates")
     serving.start_zenoh_log()
     with serving.open_session(config) as session:
-        sent = serving.play(session, about.robot, knots, rate=rate, speed=speed, wait=wait)
+        delays = [0.0]
+        sent = serving.play(
+            session, about.robot, knots, rate=rate, speed=speed, wait=wait, late=delays.append
+        )
+    # a controller hardly feels less than a period, or 10 ms
+    if not as_json and max(delays) > max(1.0 / rate, 0.01):
+        tables.note(
+            f"set-points were late, one of them by {1e3 * max(delays):.0f} ms: the climb took "
+            f"{sum(delays):.2f} s longer; try a lower --rate, or a machine with less to do"
+        )
     if as_json:
         tables.say({"v": 1, "set_points": sent, "knots": len(knots), "time": duration})
     else:

@@ -72,10 +72,10 @@ def route_command(
     own: options.Own,
     as_json: bool,
 ) -> int:
-    """Evaluate climbs: every stance, and every one with a limb in the air.
+    """Plan climbs: every stage, and every move between two stages.
 
-    ROUTE is the path of a JSON file, - for standard input, the name of a bundled route, or a
-    folder: all files in it that end in .json. Many routes are answered in order, with an error in
+    ROUTE is the path of a JSON or TOML file, - for standard input, the name of a bundled route, or
+    a folder: all files in it that end in .json. Many routes are answered in order, with an error in
     the place of each route that has one.
 
     The exit status of many routes is the worst that one of them has, as for crux batch.
@@ -91,7 +91,7 @@ def route_command(
                     f"is for one route, whose output -o is a folder, got {output}", field=option
                 )
         return _many(_Routes(routes, own), output, resume, parallel, wanted, own, as_json)
-    if len(routes) > 1 or Path(routes[0]).is_dir():
+    if len(routes) > 1 or _is_folder(routes[0]):
         raise InvalidInputError(
             f"{output}: many routes need a file that ends in {LISTED_ENDINGS}", field="-o"
         )
@@ -264,13 +264,18 @@ class _Routes:
                 yield wire.encode_error(error, wire.Format.JSON, known)
 
 
+def _is_folder(source: str) -> bool:
+    """Return whether a folder is meant, not a bundled route whose name a folder has, too."""
+    return Path(source).is_dir() and source not in stances.bundled(requests.RouteRequest)
+
+
 def _files(source: str) -> list[str]:
     """Return the routes of a folder in the order of their names, or the one that is meant."""
     if source == "-":
         raise InvalidInputError(
             "standard input is one route: give it alone, with -o DIR", field="ROUTE"
         )
-    if not Path(source).is_dir():
+    if not _is_folder(source):
         return [source]
     found = sorted(str(path) for path in Path(source).glob("*.json"))
     if not found:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -40,7 +40,9 @@ def climb_set_points(knots: Sequence[KnotReply], step: float) -> Iterator[ClimbS
         All with the state ``playing``.
     """
     first = knots[0]
-    yield _set_points(first, first, 1.0, first.body, 0)
+    # loads SciPy, for which no set-point after the first one may wait
+    (turn,) = _turns(first, first, np.ones(1))
+    yield _set_points(first, first, 1.0, PlacedFrame(first.body.position, turn), 0)
     number = 0
     for before, knot in pairwise(knots):
         # a step that fits but for rounding counts
@@ -98,6 +100,7 @@ def play(
     rate: float,
     speed: float = 1.0,
     wait: float | None = None,
+    late: Callable[[float], None] | None = None,
 ) -> int:
     """Publish the set-points of a climb at the key ``crux/<robot>/play``, each at its time.
 
@@ -118,6 +121,8 @@ def play(
         Time of the climb over time that passes; above 1, rates of the controller are exceeded.
     wait : float, optional
         How long to wait for a subscriber [s]; 1 s by default.
+    late : callable, optional
+        Called before set-points that are late, with the delay [s].
 
     Returns
     -------
@@ -157,6 +162,8 @@ def play(
                     time.sleep(early)
                 else:
                     start -= early
+                    if late is not None and sent is not None:
+                        late(-early)
                 send(points)
                 sent = points
         except BaseException as error:

@@ -38,6 +38,8 @@ def print_opening(opening: OpeningReply, out: Console) -> None:
     out.print(f"spines let go below {opening.friction:.3g} N of shear for a newton of pull")
     if opening.retreat is None:
         out.print("no retreat by a finger's length clears the straight fingers of the rock")
+    elif opening.retreat == 0.0:
+        out.print("straight fingers are clear of the rock without a retreat")
     else:
         far = 1e3 * opening.retreat
         out.print(f"straight fingers are clear of the rock after a retreat of {far:.1f} mm")

@@ -152,6 +152,19 @@ def test_hands_stay_while_the_body_shifts():
             assert off(body @ poses[limb], hand) < 1e-9
 
 
+def test_a_shift_that_is_too_far_says_how_far_the_limb_goes():
+    hands = {LIMB: BODY @ hand_at(posture()[LIMB])}
+    far = Pose(BODY.position - np.array([0.0, 0.0, 1.0]), BODY.rotation)
+    with pytest.raises(
+        BranchEndError, match=r"keep its hold beyond .* of the body's shift"
+    ) as caught:
+        shift_postures(ROBOT, hands, [far], posture())
+    assert caught.value.shifts
+    # the hand does not turn, so no angle is told
+    assert "e-" not in str(caught.value)
+    assert " rad from" not in str(caught.value)
+
+
 def test_branches_are_solutions_of_different_kinds_the_nearest_first():
     pose = BODY.inverse() @ palm(0.6, 0.4)
     near = posture()[LIMB] + 0.1

@@ -118,6 +118,13 @@ def test_routes_go_on_where_they_were_broken_off(ending, climbs, tmp_path, capfd
     assert "--resume" in complaint(capfd)
 
 
+def test_a_bundled_route_is_meant_where_a_folder_has_its_name(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / BUNDLED).mkdir()
+    assert run_command_line(["route", BUNDLED, "-o", BUNDLED, "--resume"]) == BAD_INPUT
+    assert "--resume: requires -o FILE" in complaint(capfd)
+
+
 def test_many_routes_need_a_file_and_one_a_folder(climbs, tmp_path, capfd):
     out = str(tmp_path / "out")
     for asked, told in (

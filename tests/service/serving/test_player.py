@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import signal
+import sys
+import time
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -89,6 +91,12 @@ def test_a_body_turns_the_shortest_way_at_a_constant_rate(knots):
     assert np.allclose(angles, np.outer(np.linspace(0.0, 1.0, 11), [0.0, 0.0, 0.4]), atol=1e-9)
 
 
+def test_all_is_loaded_before_the_first_set_points(knots, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.delitem(sys.modules, "scipy.spatial.transform")
+    next(climb_set_points(knots, 0.1))
+    assert "scipy.spatial.transform" in sys.modules
+
+
 def test_knots_at_one_time_follow_each_other(knots):
     again = msgspec.structs.replace(knots[0], index=1)
     assert [each.knot for each in climb_set_points([knots[0], again], 0.1)] == [0, 1]
@@ -120,6 +128,16 @@ def test_a_robot_gets_all_set_points_in_order_and_no_sooner_than_they_should_com
         for old, new in zip(a.hands, b.hands, strict=True)
     ]
     assert max(change) <= max(rates) * 20.0 / 200.0 + 1e-9
+
+
+def test_what_comes_late_is_told(knots, listening, robot, monkeypatch: pytest.MonkeyPatch):
+    slow, delays = time.sleep, []
+    monkeypatch.setattr("time.sleep", lambda seconds: slow(seconds + 0.01))
+    with open_session(client_config(listening[1])) as session:
+        play(session, "robosimian", knots[:3], rate=200.0, wait=10.0, late=delays.append)
+    robot.wait()
+    # a sleep ends 10 ms late, and the next set-points should come 5 ms after
+    assert max(delays) > 0.004
 
 
 def test_nobody_is_played_to_where_nobody_listens(knots):
