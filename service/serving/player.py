@@ -45,11 +45,13 @@ def climb_set_points(knots: Sequence[KnotReply], step: float) -> Iterator[ClimbS
     for before, knot in pairwise(knots):
         # a step that fits but for rounding counts
         count = max(1, math.ceil((knot.time - before.time) / step - 1e-9))
-        shares = np.arange(1, count + 1) / count
-        for share, turn in zip(shares.tolist(), _turns(before, knot, shares), strict=True):
-            number += 1
-            position = _mixed(before.body.position, knot.body.position, share)
-            yield _set_points(before, knot, share, PlacedFrame(position, turn), number)
+        # in pieces: a slow climb has millions of set-points between two knots
+        for first_of_piece in range(1, count + 1, 1000):
+            shares = np.arange(first_of_piece, min(first_of_piece + 1000, count + 1)) / count
+            for share, turn in zip(shares.tolist(), _turns(before, knot, shares), strict=True):
+                number += 1
+                position = _mixed(before.body.position, knot.body.position, share)
+                yield _set_points(before, knot, share, PlacedFrame(position, turn), number)
 
 
 def _set_points(

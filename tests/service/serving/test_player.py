@@ -46,7 +46,8 @@ def robot(listening) -> DryRobot:
 
 def climb_folder(folder: Path, knots: list[KnotReply], failure: dict | None = None) -> Path:
     write_trajectory(knots, folder)
-    about = {"route": "two moves", "robot": "robosimian", "climb": {"failure": failure}}
+    end = {"failure": failure, "knots": len(knots)}
+    about = {"route": "two moves", "robot": "robosimian", "climb": end}
     (folder / "summary.json").write_text(json.dumps(about))
     return folder
 
@@ -122,6 +123,14 @@ def test_a_robot_gets_all_set_points_in_order_and_no_sooner_than_they_should_com
     assert max(change) <= max(rates) * 20.0 / 200.0 + 1e-9
 
 
+def test_many_set_points_between_two_knots_are_evenly_spaced(knots):
+    slow = [msgspec.structs.replace(knot, time=45.0 * knot.index) for knot in knots[:2]]
+    points = list(climb_set_points(slow, 0.01))
+    assert [each.time for each in points] == pytest.approx(np.arange(4501) / 100.0)
+    assert points[-1].body == slow[1].body
+    assert points[-1].joints == slow[1].joints
+
+
 def test_nobody_is_played_to_where_nobody_listens(knots):
     config = zenoh_config(mode="peer", settings=["listen/endpoints:[]"], multicast=False)
     with (
@@ -169,6 +178,10 @@ def test_what_cannot_be_played_is_refused(knots, tmp_path, capfd):
     write_trajectory(knots, tmp_path)
     assert run_command_line(["play", str(tmp_path)]) == BAD_INPUT
     assert "summary.json: No such file" in complaint(capfd)
+    climb_folder(tmp_path, knots)
+    write_trajectory(knots[:-1], tmp_path)
+    assert run_command_line(["play", str(tmp_path)]) == BAD_INPUT
+    assert f"ends after {len(knots) - 1} knots, the climb of summary.json has" in complaint(capfd)
     unsure = [msgspec.structs.replace(knot, verified=knot.index != 2) for knot in knots]
     assert run_command_line(["play", str(climb_folder(tmp_path, unsure))]) == BAD_INPUT
     assert "knot 2 is not verified" in complaint(capfd)
