@@ -16,7 +16,7 @@ from hand_models.hand import FINGERS
 from planner.explanation import joint_name, limit_name
 from planner.prepare import JointLoads, Posture, PreparedStance, assemble, posture_at
 from planner.programs import CAP_SLACK, LOAD_UNIT
-from planner.question import HandOnHold, Question, Stance
+from planner.question import HandOnHold, Objective, Question, Stance
 from planner.result import LimitName, LoadRecovery, PlanArrays
 from planner.robots import LinkTree
 from planner.route.climb import Route
@@ -269,7 +269,12 @@ class HeldPosture:
         return tuple(found)
 
 
-def hold_as_planned(posed: Posed, near: Solution | None = None, press: float = 0.0) -> HeldPosture:
+def hold_as_planned(
+    posed: Posed,
+    near: Solution | None = None,
+    press: float = 0.0,
+    objective: Objective | None = None,
+) -> HeldPosture:
     """Return the verified plan of a posture.
 
     Parameters
@@ -279,6 +284,8 @@ def hold_as_planned(posed: Posed, near: Solution | None = None, press: float = 0
         Solution of the same hands, as a warm start.
     press : float, optional
         Force with which palms press, and drag, at least [N].
+    objective : str, optional
+        In place of the route's.
 
     Raises
     ------
@@ -290,6 +297,8 @@ def hold_as_planned(posed: Posed, near: Solution | None = None, press: float = 0
     check = Check(prepared.question, prepared.batch, prepared.where)
     checks = Checks(check, posed.recovery, idle_joints(prepared))
     asked = _pressing(prepared, press) if press > 0.0 else prepared
+    if objective is not None:
+        asked = replace(asked, question=replace(asked.question, objective=objective))
     found = answer_on(asked, time.perf_counter(), checks, near, prove=press == 0.0)
     answer = found.answer
     if (
@@ -347,7 +356,7 @@ def _checked(held: HeldPosture) -> HeldPosture:
         from planner.explanation import constraint_words
 
         what = "a limit" if name is None else f"{name.limb}: {constraint_words(name)}"
-        raise NoPlanError(f"{what} is used to {used:.3g} of its capacity")
+        raise NoPlanError(f"{what}, and would need {used / most:.6g} of what it may")
     return held
 
 

@@ -253,6 +253,22 @@ def test_tensions_change_by_no_more_than_the_limit(route, climb):
     assert small.knots[-1].utilisation == pytest.approx(climb.knots[-1].utilisation, abs=1e-9)
 
 
+def test_a_least_change_of_tensions_keeps_the_number_of_knots_small(route):
+    with pytest.raises(InvalidInputError, match=r"at least 0\.1 N in a climb") as raised:
+        plan_climb(replace(route, limits=Limits(tension_change=0.001)))
+    assert raised.value.field == "limits.tension_change"
+
+
+def test_plans_of_least_effort_leave_room_between_them(route):
+    """They use all of the cap, from which spines that let go would take the hands beyond it."""
+    found = plan_climb(replace(route, objective="min_effort"))
+    assert found.failure is None
+    stages = [knot.utilisation for knot in found.knots if knot.stage is not None]
+    assert stages == pytest.approx([1.0] * 4, abs=1e-5)
+    check_knots(found)
+    check_between(found, [0.5])
+
+
 def test_a_move_of_the_whole_scene_changes_no_utilisation(route, climb):
     turn = Rotation.from_rotvec([0.3, -0.5, 1.1]).as_matrix()
     by = Pose(np.array([1.0, -2.0, 0.7]), turn)
