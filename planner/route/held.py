@@ -14,7 +14,7 @@ from hand_models.base import Array, Pose, wrench_transport
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from hand_models.hand import FINGERS
 from planner.explanation import joint_name, limit_name
-from planner.prepare import JointLoads, Posture, PreparedStance, assemble, posture_at
+from planner.prepare import FORCE_CAP, JointLoads, Posture, PreparedStance, assemble, posture_at
 from planner.programs import CAP_SLACK, LOAD_UNIT
 from planner.question import HandOnHold, Objective, Question, Stance
 from planner.result import LimitName, LoadRecovery, PlanArrays
@@ -50,6 +50,8 @@ class MovingHand:
         [N, N·m].
     utilisation : float
         Largest load of its fingers over capacity.
+    limiting : LimitName
+        The limit of that load.
     """
 
     limb: str
@@ -59,6 +61,7 @@ class MovingHand:
     wrench: Array
     deviation: Array
     utilisation: float
+    limiting: LimitName
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +154,21 @@ class Posed:
         )
         return found
 
+    def cap_use(self, beside: Array) -> float:
+        """Return the share of the cap on its force that the moving hand has on its rock.
+
+        ``beside``, shape (3,), is how far the force may be from there, in H [N].
+        """
+        moving = self.moving
+        cap = None if moving is None else self.route.limits.per_hand.get(moving.limb)
+        if cap is None or moving is None or not moving.on_rock:
+            return 0.0
+        turn = np.eye(3) if cap.frame == "hand" else self.hand_poses[moving.limb].rotation
+        if cap.frame == "world":
+            turn = self.body.rotation @ turn
+        force, around = turn @ moving.wrench[:3], np.abs(turn) @ beside
+        return cap.use(force.tolist(), around.tolist())
+
     @property
     def idle(self) -> dict[str, JointLoads]:
         """Joint loads of the limbs whose hands do not hold the robot, by limb."""
@@ -233,7 +251,9 @@ class HeldPosture:
         ]
         moving = self.posed.moving
         if moving is not None and moving.on_rock:
-            found.append((moving.utilisation, LimitName(moving.limb, None, None, "shear")))
+            found.append((moving.utilisation, moving.limiting))
+            cap = LimitName(moving.limb, None, None, FORCE_CAP)
+            found.append((self.posed.cap_use(np.zeros(3)), cap))
         return max(found, key=lambda each: each[0])
 
     @property
@@ -356,7 +376,8 @@ def _checked(held: HeldPosture) -> HeldPosture:
         from planner.explanation import constraint_words
 
         what = "a limit" if name is None else f"{name.limb}: {constraint_words(name)}"
-        raise NoPlanError(f"{what}, and would need {used / most:.6g} of what it may")
+        share = f", and would need {used / most:.6g} of what it may" if np.isfinite(used) else ""
+        raise NoPlanError(f"{what}{share}")
     return held
 
 

@@ -1,5 +1,6 @@
 """Climbs planned as one: every knot by an independent recomputation, and between the knots."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from hand_models.base import InvalidInputError, Pose, UnsupportedError, wrench_t
 from hand_models.hand import FINGERS
 from planner import (
     ClimbSettings,
+    ForceCap,
     Limits,
     Load,
     Move,
@@ -257,6 +259,28 @@ def test_a_least_change_of_tensions_keeps_the_number_of_knots_small(route):
     with pytest.raises(InvalidInputError, match=r"at least 0\.1 N in a climb") as raised:
         plan_climb(replace(route, limits=Limits(tension_change=0.001)))
     assert raised.value.field == "limits.tension_change"
+
+
+def test_a_cap_on_the_force_counts_while_a_hand_opens(route):
+    """The closed hand pulls at the rock; while it opens it presses, with 4.4 N."""
+
+    def capped(most):
+        cap = ForceCap(largest_force=(None, None, (-1e4, most)))
+        return plan_climb(replace(route, limits=Limits(per_hand={"front_left": cap})))
+
+    pressed = []
+    for knot in capped(6.0).knots:
+        (hand,) = (hand for hand in knot.hands if hand.limb == "front_left")
+        assert hand.wrench[2] <= 6.0 * knot.utilisation + 1e-9
+        if knot.phase == "open":
+            pressed.append(hand.wrench[2])
+    assert max(pressed) > 4.0
+    for most, words in ((2.0, r"would need [12]\."), (0.0, "$")):
+        failure = capped(most).failure
+        assert (failure.phase, failure.limb) == ("open", "front_left")
+        assert re.search(
+            f"front_left: the hand may exert no more that way.*{words}", failure.reason
+        )
 
 
 def test_plans_of_least_effort_leave_room_between_them(route):
