@@ -75,8 +75,8 @@ def plan_climb(
     InvalidInputError
         If a stance or a move is not valid; the field is relative to the route.
     UnsupportedError
-        If a wrist is not fixed, the body accelerates about an axis, or a move gives joint angles of
-        a limb that stays.
+        If a wrist is not fixed, the body accelerates about an axis, palms have a margin, or a move
+        gives joint angles of a limb that stays.
     """
     if route.start.joints is None:
         route = replace(route, start=replace(route.start, joints="solve"))

@@ -349,6 +349,9 @@ def test_what_a_climb_cannot_have_is_refused(route):
     with pytest.raises(UnsupportedError) as raised:
         plan_climb(replace(route, load=Load(angular_acceleration=(0.1, 0.0, 0.0))))
     assert raised.value.field == "load.angular_acceleration"
+    with pytest.raises(UnsupportedError, match="comes off its rock") as raised:
+        plan_climb(replace(route, limits=Limits(palm_margin=2.0)))
+    assert raised.value.field == "limits.palm_margin"
     (move,) = route.moves
     given = replace(move, joints={"rear_left": np.zeros(7)})
     with pytest.raises(UnsupportedError) as raised:
