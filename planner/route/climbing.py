@@ -35,7 +35,6 @@ from planner.route.climb import Move, Route
 from planner.route.first_checks import checked_stages, climb_scene, refuse
 from planner.route.held import (
     HeldPosture,
-    MovingHand,
     NoPlanError,
     Posed,
     hold_as_planned,
@@ -43,6 +42,7 @@ from planner.route.held import (
 )
 from planner.route.knots import Climb, Failure, Knot, KnotPhase
 from planner.route.moving import closing_loads, closing_states, in_air, opening_states
+from planner.route.moving_hand import MovingHand
 from planner.route.settings import ClimbSettings, KnotNumbers
 from planner.solving import Solution
 

@@ -22,46 +22,15 @@ from planner.robots import LinkTree
 from planner.route.climb import Route
 from planner.route.hold_rows import HoldRows
 from planner.route.knots import HandKnot
+from planner.route.moving_hand import MovingHand
 from planner.solving import Checks, Solution, Verified, answer_on, idle_joints
 from planner.verification import Check
 
-__all__ = ["HeldPosture", "MovingHand", "NoPlanError", "Posed", "hold_as_planned", "hold_with"]
+__all__ = ["HeldPosture", "NoPlanError", "Posed", "hold_as_planned", "hold_with"]
 
 
 class NoPlanError(Exception):
     """Error: the hands cannot hold the robot in a posture; the message says why."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class MovingHand:
-    """A hand that opens, closes or is in the air, whose loads are given.
-
-    Attributes
-    ----------
-    limb : str
-    on_rock : bool
-        Whether it touches its hold.
-    tensions, winch_angles : ndarray, shape (4,)
-        Tension [N] and winch angle [rad] of each tendon.
-    wrench : ndarray, shape (6,)
-        Wrench on the rock, in H [N, N·m].
-    deviation : ndarray, shape (6,)
-        How far the wrench may be from the straight line from the state before, each component
-        [N, N·m].
-    utilisation : float
-        Largest load of its fingers over capacity.
-    limiting : LimitName
-        The limit of that load.
-    """
-
-    limb: str
-    on_rock: bool
-    tensions: Array
-    winch_angles: Array
-    wrench: Array
-    deviation: Array
-    utilisation: float
-    limiting: LimitName
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,13 +130,9 @@ class Posed:
         """
         moving = self.moving
         cap = None if moving is None else self.route.limits.per_hand.get(moving.limb)
-        if cap is None or moving is None or not moving.on_rock:
+        if cap is None or moving is None:
             return 0.0
-        turn = np.eye(3) if cap.frame == "hand" else self.hand_poses[moving.limb].rotation
-        if cap.frame == "world":
-            turn = self.body.rotation @ turn
-        force, around = turn @ moving.wrench[:3], np.abs(turn) @ beside
-        return cap.use(force.tolist(), around.tolist())
+        return moving.cap_use(cap, self.hand_poses[moving.limb].rotation, self.body, beside)
 
     @property
     def idle(self) -> dict[str, JointLoads]:

@@ -13,7 +13,8 @@ from hand_models.opening import HandPath, closing_path, opening_path
 from hand_models.wrench_spaces import WrenchSpace
 from planner.explanation import limit_name
 from planner.prepare import FORCE_CAP
-from planner.route.held import MovingHand, NoPlanError
+from planner.route.held import NoPlanError
+from planner.route.moving_hand import MovingHand
 
 __all__ = ["closing_loads", "closing_states", "in_air", "opening_states"]
 
