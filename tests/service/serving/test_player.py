@@ -14,6 +14,7 @@ import pytest
 import zenoh
 from scipy.spatial.transform import Rotation
 
+from hand_models.base import UnsupportedError
 from service.bulk import write_trajectory
 from service.commands.cli import run_command_line
 from service.replies import KnotReply
@@ -185,6 +186,27 @@ def test_what_cannot_be_played_is_refused(knots, tmp_path, capfd):
     unsure = [msgspec.structs.replace(knot, verified=knot.index != 2) for knot in knots]
     assert run_command_line(["play", str(climb_folder(tmp_path, unsure))]) == BAD_INPUT
     assert "knot 2 is not verified" in complaint(capfd)
+
+
+def test_a_second_player_is_refused_while_the_first_one_plays(knots, listening, robot, tmp_path):
+    folder = climb_folder(tmp_path, knots)
+    flags = ["-m", "client", "-e", listening[1], "--no-multicast-scouting", "--wait", "30"]
+    first = begun("play", str(folder), *flags, "--rate", "50")
+    until(lambda: len(robot.taken) >= 5, first)
+    with (
+        open_session(client_config(listening[1])) as session,
+        pytest.raises(UnsupportedError, match="another player sends set-points"),
+    ):
+        play(session, "robosimian", knots, rate=100.0, speed=50.0, wait=30.0)
+    first.send_signal(signal.SIGINT)
+    ended(first)
+    robot.wait()
+    assert [points.number for points in robot.taken] == list(range(len(robot.taken)))
+    again = DryRobot(listening[0])
+    with open_session(client_config(listening[1])) as session:
+        play(session, "robosimian", knots, rate=100.0, speed=50.0, wait=30.0)
+    again.wait()
+    assert again.taken[-1].state == "done"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
