@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array, UnsupportedError
+from hand_models.base import Array, InvalidFieldError, UnsupportedError
 from hand_models.finger import (
     PHALANGES,
     FingerPath,
@@ -137,6 +137,8 @@ def opening_path(hand: SettledHand, *, force: float = PATH_SETTINGS.force) -> Ha
     ------
     UnsupportedError
         If tiles of the hand have slipped.
+    InvalidFieldError
+        If ``force`` is below zero or not a number.
     """
     return _path(hand, force, opens=True)
 
@@ -150,6 +152,8 @@ def closing_path(hand: SettledHand, *, force: float = PATH_SETTINGS.force) -> Ha
 
 
 def _path(hand: SettledHand, force: float, *, opens: bool) -> HandPath:
+    if not force >= 0.0:
+        raise InvalidFieldError(f"must be 0 N or more, got {force:g}", field="force")
     if hand.closed is not None:
         raise UnsupportedError("the path of a hand some of whose tiles have slipped is not known")
     paths: list[FingerPath] = []

@@ -40,7 +40,7 @@ def write_report(result: RouteResult, folder: Path, climb: Climb | None = None) 
     result : RouteResult
         Plans of all stages of the climb.
     folder : Path
-        Created if missing; files of these names are replaced.
+        Created if missing; files of these names are replaced, and removed if not written.
     climb : Climb, optional
         Knots of the climb; with them ``climb.png`` shows the robot and its margins along the time,
         and ``support.png`` where the centre of mass may be and goes.
@@ -64,6 +64,9 @@ def write_report(result: RouteResult, folder: Path, climb: Climb | None = None) 
         writer = csv.DictWriter(stream, rows[0])
         writer.writeheader()
         writer.writerows(rows)
+    for name in ("climb.png", "support.png"):
+        # of an earlier climb
+        (folder / name).unlink(missing_ok=True)
     pictures = {"picture": draw_route(result)}
     if climb is not None and climb.knots:
         files["climb"] = folder / "climb.png"

@@ -121,6 +121,26 @@ class ForceCap(Strict, frozen=True):
         given = self.largest_force
         return tuple(map(_range, given)) if isinstance(given, Sequence) else float(given)
 
+    def use(self, force: Sequence[float], beside: Sequence[float] = (0.0, 0.0, 0.0)) -> float:
+        """Return the largest share of the cap that a force has; infinite along an axis of none.
+
+        Parameters
+        ----------
+        force : sequence of float, length 3
+            Force on the rock, in the frame of the cap [N].
+        beside : sequence of float, length 3, optional
+            How far the force may be from there along each axis [N].
+        """
+        most = self.most
+        if isinstance(most, float):
+            return math.hypot(*(abs(f) + d for f, d in zip(force, beside, strict=True))) / most
+        shares = [0.0]
+        for f, d, (low, high) in zip(force, beside, most, strict=True):
+            for along, end in ((f + d, high), (d - f, -low)):
+                # forces of less than 1e-6 N count as none
+                shares.append(along / end if end else math.inf if along > 1e-6 else 0.0)
+        return max(shares)
+
 
 def _range(axis: float | Sequence[float] | None) -> tuple[float, float]:
     """Return the least and the largest force along an axis [N]."""

@@ -129,6 +129,8 @@ class Passage:
         most = max(
             [0.0, *(each.utilisation for each in moving if each is not None and each.on_rock)]
         )
+        around = self._deviation[:3]
+        most = max(most, *(held.posed.cap_use(around) for held in (self.start, self.end)))
         ball, box = self._ball, self._box
         d, e = np.zeros(len(rows.used)), np.zeros(len(rows.used))
         if ball.any() or box.any():

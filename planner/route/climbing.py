@@ -16,7 +16,7 @@ from itertools import islice, pairwise
 
 import numpy as np
 
-from hand_models.base import Array, Pose
+from hand_models.base import Array, InvalidInputError, Pose
 from planner.motion import (
     BranchEndError,
     NoWayError,
@@ -27,7 +27,7 @@ from planner.motion import (
 )
 from planner.prepare import posture
 from planner.programs import CAP_SLACK
-from planner.question import HandOnHold
+from planner.question import HandOnHold, Objective
 from planner.robots import UnreachableError, scene_number, solve_limbs
 from planner.route.between import Passage
 from planner.route.branch_choice import bodies_until_lifted, candidates_on, lasting, start_joints
@@ -35,7 +35,6 @@ from planner.route.climb import Move, Route
 from planner.route.first_checks import checked_stages, climb_scene, refuse
 from planner.route.held import (
     HeldPosture,
-    MovingHand,
     NoPlanError,
     Posed,
     hold_as_planned,
@@ -43,6 +42,7 @@ from planner.route.held import (
 )
 from planner.route.knots import Climb, Failure, Knot, KnotPhase
 from planner.route.moving import closing_loads, closing_states, in_air, opening_states
+from planner.route.moving_hand import MovingHand
 from planner.route.settings import ClimbSettings, KnotNumbers
 from planner.solving import Solution
 
@@ -75,13 +75,20 @@ def plan_climb(
     InvalidInputError
         If a stance or a move is not valid; the field is relative to the route.
     UnsupportedError
-        If a wrist is not fixed, the body accelerates about an axis, or a move gives joint angles of
-        a limb that stays.
+        If a wrist is not fixed, the body accelerates about an axis, palms have a margin, or a move
+        gives joint angles of a limb that stays.
     """
     solved = route
     if route.start.joints is None:
         solved = replace(route, start=replace(route.start, joints="solve"))
     refuse(solved)
+    least = KnotNumbers.bundled().least_change
+    if route.limits.tension_change is not None and route.limits.tension_change < least:
+        raise InvalidInputError(
+            f"must be at least {least:g} N in a climb, which would have too many knots, got "
+            f"{route.limits.tension_change:g}; a controller interpolates between knots",
+            field="limits.tension_change",
+        )
     planner, failure = _Planner(solved, (settings or ClimbSettings()).complete()), None
     try:
         planner.begin()
@@ -284,11 +291,18 @@ class _Planner:
             raise _BlockedError(failure) from error
 
     def _plan(self, posed: Posed, *, stage: bool = False) -> HeldPosture:
-        """Return the plan of a posture; between stages palms press, so that they can settle."""
-        press = self._numbers.press
+        """Return the plan of a posture; between stages palms press, so that they can settle.
+
+        Plans of least effort, and those that serve samples best, may use all of the cap, and leave
+        no room on the way; between stages the margin is the largest in their place.
+        """
+        press, objective = self._numbers.press, self._route.objective
+        wide: Objective | None = None
+        if not stage and objective in ("min_effort", "max_robust"):
+            wide = "max_margin"
         for least in (0.0,) if stage else (press, 0.25 * press, 0.0):
             try:
-                held = hold_as_planned(posed, self._near, least)
+                held = hold_as_planned(posed, self._near, least, wide)
             except NoPlanError:
                 if not least:
                     raise

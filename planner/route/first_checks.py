@@ -21,8 +21,8 @@ def refuse(route: Route) -> None:
     Raises
     ------
     UnsupportedError
-        If a wrist is not fixed, a hand's wrench is given, the body accelerates about an axis, or a
-        move gives joint angles of a limb that stays.
+        If a wrist is not fixed, a hand's wrench is given, the body accelerates about an axis, palms
+        have a margin, or a move gives joint angles of a limb that stays.
     """
     places = [(f"stance.hands[{i}]", hand) for i, hand in enumerate(route.start.hands)]
     places += [(f"moves[{i}]", move.hand) for i, move in enumerate(route.moves)]
@@ -43,6 +43,12 @@ def refuse(route: Route) -> None:
         raise UnsupportedError(
             "is not available in a climb, whose loads are those at rest; leave it out",
             field="load.angular_acceleration",
+        )
+    if route.limits.palm_margin:
+        raise UnsupportedError(
+            "is not available in a climb, in which the palm of a hand that leaves comes off its "
+            "rock; leave it out",
+            field="limits.palm_margin",
         )
     for i, move in enumerate(route.moves):
         others = [] if isinstance(move.joints, str) else [*move.joints]

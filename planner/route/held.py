@@ -14,51 +14,23 @@ from hand_models.base import Array, Pose, wrench_transport
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from hand_models.hand import FINGERS
 from planner.explanation import joint_name, limit_name
-from planner.prepare import JointLoads, Posture, PreparedStance, assemble, posture_at
+from planner.prepare import FORCE_CAP, JointLoads, Posture, PreparedStance, assemble, posture_at
 from planner.programs import CAP_SLACK, LOAD_UNIT
-from planner.question import HandOnHold, Question, Stance
+from planner.question import HandOnHold, Objective, Question, Stance
 from planner.result import LimitName, LoadRecovery, PlanArrays
 from planner.robots import LinkTree
 from planner.route.climb import Route
 from planner.route.hold_rows import HoldRows
 from planner.route.knots import HandKnot
+from planner.route.moving_hand import MovingHand
 from planner.solving import Checks, Solution, Verified, answer_on, idle_joints
 from planner.verification import Check
 
-__all__ = ["HeldPosture", "MovingHand", "NoPlanError", "Posed", "hold_as_planned", "hold_with"]
+__all__ = ["HeldPosture", "NoPlanError", "Posed", "hold_as_planned", "hold_with"]
 
 
 class NoPlanError(Exception):
     """Error: the hands cannot hold the robot in a posture; the message says why."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class MovingHand:
-    """A hand that opens, closes or is in the air, whose loads are given.
-
-    Attributes
-    ----------
-    limb : str
-    on_rock : bool
-        Whether it touches its hold.
-    tensions, winch_angles : ndarray, shape (4,)
-        Tension [N] and winch angle [rad] of each tendon.
-    wrench : ndarray, shape (6,)
-        Wrench on the rock, in H [N, N·m].
-    deviation : ndarray, shape (6,)
-        How far the wrench may be from the straight line from the state before, each component
-        [N, N·m].
-    utilisation : float
-        Largest load of its fingers over capacity.
-    """
-
-    limb: str
-    on_rock: bool
-    tensions: Array
-    winch_angles: Array
-    wrench: Array
-    deviation: Array
-    utilisation: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +123,17 @@ class Posed:
         )
         return found
 
+    def cap_use(self, beside: Array) -> float:
+        """Return the share of the cap on its force that the moving hand has on its rock.
+
+        ``beside``, shape (3,), is how far the force may be from there, in H [N].
+        """
+        moving = self.moving
+        cap = None if moving is None else self.route.limits.per_hand.get(moving.limb)
+        if cap is None or moving is None:
+            return 0.0
+        return moving.cap_use(cap, self.hand_poses[moving.limb].rotation, self.body, beside)
+
     @property
     def idle(self) -> dict[str, JointLoads]:
         """Joint loads of the limbs whose hands do not hold the robot, by limb."""
@@ -233,7 +216,9 @@ class HeldPosture:
         ]
         moving = self.posed.moving
         if moving is not None and moving.on_rock:
-            found.append((moving.utilisation, LimitName(moving.limb, None, None, "shear")))
+            found.append((moving.utilisation, moving.limiting))
+            cap = LimitName(moving.limb, None, None, FORCE_CAP)
+            found.append((self.posed.cap_use(np.zeros(3)), cap))
         return max(found, key=lambda each: each[0])
 
     @property
@@ -269,7 +254,12 @@ class HeldPosture:
         return tuple(found)
 
 
-def hold_as_planned(posed: Posed, near: Solution | None = None, press: float = 0.0) -> HeldPosture:
+def hold_as_planned(
+    posed: Posed,
+    near: Solution | None = None,
+    press: float = 0.0,
+    objective: Objective | None = None,
+) -> HeldPosture:
     """Return the verified plan of a posture.
 
     Parameters
@@ -279,6 +269,8 @@ def hold_as_planned(posed: Posed, near: Solution | None = None, press: float = 0
         Solution of the same hands, as a warm start.
     press : float, optional
         Force with which palms press, and drag, at least [N].
+    objective : str, optional
+        In place of the route's.
 
     Raises
     ------
@@ -290,6 +282,8 @@ def hold_as_planned(posed: Posed, near: Solution | None = None, press: float = 0
     check = Check(prepared.question, prepared.batch, prepared.where)
     checks = Checks(check, posed.recovery, idle_joints(prepared))
     asked = _pressing(prepared, press) if press > 0.0 else prepared
+    if objective is not None:
+        asked = replace(asked, question=replace(asked.question, objective=objective))
     found = answer_on(asked, time.perf_counter(), checks, near, prove=press == 0.0)
     answer = found.answer
     if (
@@ -347,7 +341,8 @@ def _checked(held: HeldPosture) -> HeldPosture:
         from planner.explanation import constraint_words
 
         what = "a limit" if name is None else f"{name.limb}: {constraint_words(name)}"
-        raise NoPlanError(f"{what} is used to {used:.3g} of its capacity")
+        share = f", and would need {used / most:.6g} of what it may" if np.isfinite(used) else ""
+        raise NoPlanError(f"{what}{share}")
     return held
 
 

@@ -11,7 +11,10 @@ from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.opening import HandPath, closing_path, opening_path
 from hand_models.wrench_spaces import WrenchSpace
-from planner.route.held import MovingHand, NoPlanError
+from planner.explanation import limit_name
+from planner.prepare import FORCE_CAP
+from planner.route.held import NoPlanError
+from planner.route.moving_hand import MovingHand
 
 __all__ = ["closing_loads", "closing_states", "in_air", "opening_states"]
 
@@ -71,8 +74,11 @@ def _states(
     wrenches[at] = closed
     deviation = np.vstack([np.zeros(6), path.deviation])
     deviation[1 if opens else -1] += off
-    joints = [row.limit.startswith("joint") for row in space.rows[: len(space.s)]]
-    most = max(float(used[~np.array(joints)].max()), 0.0)
+    # joints and the cap on the force count with the wrench of each state
+    rows = space.rows[: len(space.s)]
+    apart = [row.limit.startswith("joint") or row.limit == FORCE_CAP for row in rows]
+    used = np.where(apart, 0.0, used)
+    worst = int(used.argmax())
     return [
         MovingHand(
             limb=limb,
@@ -81,7 +87,8 @@ def _states(
             winch_angles=winches[k],
             wrench=wrenches[k],
             deviation=deviation[k],
-            utilisation=most,
+            utilisation=max(float(used[worst]), 0.0),
+            limiting=limit_name(limb, rows[worst]),
         )
         for k in range(len(wrenches))
     ]

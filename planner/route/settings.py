@@ -96,6 +96,8 @@ class KnotNumbers(NamedTuple):
         Force with which palms press at knots between stages [N].
     halvings : int
         Times that the way between two knots is halved at most.
+    least_change : float
+        Smallest limit of the change of tensions between two knots [N].
     """
 
     excess: float
@@ -103,6 +105,7 @@ class KnotNumbers(NamedTuple):
     slack: float
     press: float
     halvings: int
+    least_change: float
 
     @classmethod
     def bundled(cls) -> Self:
@@ -118,4 +121,5 @@ class KnotNumbers(NamedTuple):
             slack=number("slack"),
             press=number("press"),
             halvings=int(number("halvings")),
+            least_change=number("least_change"),
         )

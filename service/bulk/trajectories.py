@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -66,7 +67,8 @@ def read_trajectory(folder: Path) -> list[KnotReply]:
     Raises
     ------
     InvalidInputError
-        If the folder has no trajectory, or a line of it is no knot, or the times decrease.
+        If the folder has no trajectory, or a line of it is no knot, or does not follow the one
+        before: a knot is missing, the times decrease, or limbs, hands or joints are others.
     """
     path = _lines_of(folder)
     try:
@@ -81,10 +83,11 @@ def read_trajectory(folder: Path) -> list[KnotReply]:
             knots.append(msgspec.json.decode(line, type=KnotReply))
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
             raise InvalidInputError(f"{path}, line {number}: {error}", field="DIR") from None
-        if len(knots) > 1 and not knots[-1].time >= knots[-2].time:
+        wrong = _wrong_alone(knots[-1]) or (_wrong_after(*knots[-2:]) if len(knots) > 1 else None)
+        if wrong is not None:
             raise InvalidInputError(
-                f"{path}, line {number}: time must not decrease, got {knots[-1].time:g} s after "
-                f"{knots[-2].time:g} s",
+                f"{path}, line {number}: {wrong}; write it again with: "
+                f"crux route ROUTE -o {folder}",
                 field="DIR",
             )
     if not knots:
@@ -92,10 +95,38 @@ def read_trajectory(folder: Path) -> list[KnotReply]:
     return knots
 
 
+def _wrong_alone(knot: KnotReply) -> str | None:
+    """Return what is wrong with the numbers of a knot that are played; None if nothing is."""
+    if not knot.time <= 1e9:
+        return f"time must be at most 1e9 s, got {knot.time:g} s"
+    x, turn = knot.body.position, knot.body.orientation
+    if len(x) != 3 or len(turn) != 4 or not abs(math.hypot(*turn) - 1.0) <= 1e-6:
+        return "body must have three coordinates and a unit quaternion [x, y, z, w]"
+    for hand in knot.hands:
+        if len(hand.tensions) != len(FINGERS) or min(hand.tensions) < 0.0:
+            return f"tensions of {hand.limb} must be {len(FINGERS)}, none below zero"
+    return None
+
+
+def _wrong_after(before: KnotReply, knot: KnotReply) -> str | None:
+    """Return why a knot cannot follow another; None if it can."""
+    if not knot.time >= before.time:
+        return f"time must not decrease, got {knot.time:g} s after {before.time:g} s"
+    if knot.index != before.index + 1:
+        return f"index must be {before.index + 1}, got {knot.index}: knots are missing"
+    here, there = ({limb: len(own) for limb, own in each.joints.items()} for each in (before, knot))
+    if here != there:
+        return "joints must be of the same limbs, and as many, as in the line before"
+    if [hand.limb for hand in before.hands] != [hand.limb for hand in knot.hands]:
+        return "hands must be of the same limbs, in the same order, as in the line before"
+    return None
+
+
 class ClimbOutcome(msgspec.Struct):
     """End of a climb in a summary: ``failure`` is None if it runs from end to end."""
 
     failure: ClimbFailureReply | None
+    knots: int
 
 
 class ClimbSummary(msgspec.Struct):

@@ -236,7 +236,13 @@ def play_command(
     robot has to be at the start of the climb.
     """
     knots, about = bulk.read_trajectory(folder), bulk.read_climb_summary(folder)
-    failure = about.climb.failure
+    failure, count = about.climb.failure, knots[-1].index + 1
+    if count != about.climb.knots:
+        raise InvalidInputError(
+            f"{folder}: the trajectory ends after {count} knots, the climb of summary.json has "
+            f"{about.climb.knots}; write both again with: crux route ROUTE -o {folder}",
+            field="DIR",
+        )
     if failure is not None and not up_to_failure:
         raise InvalidInputError(
             f"{folder}: the climb fails in move {failure.move} ({failure.phase}): "

@@ -7,12 +7,13 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 import zenoh
 from msgspec.structs import replace
 
-from hand_models.base import Array
+from hand_models.base import Array, UnsupportedError
 from service.processes import Interrupted
 from service.replies import ClimbSetPoints, KnotReply, PlacedFrame, Vector
 from service.serving.settings import SERVING_SETTINGS
@@ -47,11 +48,13 @@ def climb_set_points(knots: Sequence[KnotReply], step: float) -> Iterator[ClimbS
     for before, knot in pairwise(knots):
         # a step that fits but for rounding counts
         count = max(1, math.ceil((knot.time - before.time) / step - 1e-9))
-        shares = np.arange(1, count + 1) / count
-        for share, turn in zip(shares.tolist(), _turns(before, knot, shares), strict=True):
-            number += 1
-            position = _mixed(before.body.position, knot.body.position, share)
-            yield _set_points(before, knot, share, PlacedFrame(position, turn), number)
+        # in pieces: a slow climb has millions of set-points between two knots
+        for first_of_piece in range(1, count + 1, 1000):
+            shares = np.arange(first_of_piece, min(first_of_piece + 1000, count + 1)) / count
+            for share, turn in zip(shares.tolist(), _turns(before, knot, shares), strict=True):
+                number += 1
+                position = _mixed(before.body.position, knot.body.position, share)
+                yield _set_points(before, knot, share, PlacedFrame(position, turn), number)
 
 
 def _set_points(
@@ -133,6 +136,8 @@ def play(
     ------
     NoServiceError
         If nobody subscribes to the key.
+    UnsupportedError
+        If another player is playing to the robot, as far as the session reaches.
     BaseException
         What interrupts this function, after the last set-points have been published again, with
         the state ``stopped``.
@@ -151,8 +156,10 @@ def play(
         form = Format.JSON
         publisher.put(form.encode(points), encoding=form.label(points))
 
+    token = session.liveliness().declare_token(f"{key}/{session.info.zid()}/{uuid4().hex}")
     try:
         _await_subscriber(publisher, wait)
+        _refuse_rivals(session, key)
         sent: ClimbSetPoints | None = None
         start = time.monotonic() - knots[0].time / speed
         try:
@@ -177,7 +184,19 @@ def play(
         send(replace(sent, number=sent.number + 1, state="done"))
         return sent.number + 1
     finally:
+        token.undeclare()
         publisher.undeclare()
+
+
+def _refuse_rivals(session: zenoh.Session, key: str) -> None:
+    """Refuse to play beside another player; of two that begin together, none plays."""
+    tokens = session.liveliness().get(f"{key}/**", timeout=SERVING_SETTINGS.search_timeout)
+    if len({str(reply.ok.key_expr) for reply in tokens if reply.ok is not None}) > 1:
+        raise UnsupportedError(
+            f"another player sends set-points to {key}; a robot cannot follow two: wait until that "
+            "one has ended, or stop it",
+            field="DIR",
+        )
 
 
 def _await_subscriber(publisher: zenoh.Publisher, wait: float | None) -> None:

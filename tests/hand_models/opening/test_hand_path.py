@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hand_models import Cylinder, Grasp, Pose, SettledHand, Sphere, wrench_space
-from hand_models.base import UnsupportedError
+from hand_models.base import InvalidFieldError, UnsupportedError
 from hand_models.fixed_wrist import slipped_hand
 from hand_models.hand import FINGERS
 from hand_models.opening import HandPath, clear_retreat, closing_path, opening_path
@@ -251,3 +251,9 @@ def test_few_knots_are_few_and_keep_within_the_tolerance():
     knots = few_knots(at, waves, tolerance)
     assert (deviations(at, waves, knots) <= tolerance + 1e-12).all()
     assert len(knots) < 30
+
+
+@pytest.mark.parametrize("force", [-1.0, math.nan])
+def test_a_distance_from_straight_lines_below_zero_is_refused(force):
+    with pytest.raises(InvalidFieldError, match="force: must be 0 N or more"):
+        opening_path(hand_of(0), force=force)

@@ -1,5 +1,6 @@
 """Climbs planned as one: every knot by an independent recomputation, and between the knots."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from hand_models.base import InvalidInputError, Pose, UnsupportedError, wrench_t
 from hand_models.hand import FINGERS
 from planner import (
     ClimbSettings,
+    ForceCap,
     Limits,
     Load,
     Move,
@@ -253,6 +255,44 @@ def test_tensions_change_by_no_more_than_the_limit(route, climb):
     assert small.knots[-1].utilisation == pytest.approx(climb.knots[-1].utilisation, abs=1e-9)
 
 
+def test_a_least_change_of_tensions_keeps_the_number_of_knots_small(route):
+    with pytest.raises(InvalidInputError, match=r"at least 0\.1 N in a climb") as raised:
+        plan_climb(replace(route, limits=Limits(tension_change=0.001)))
+    assert raised.value.field == "limits.tension_change"
+
+
+def test_a_cap_on_the_force_counts_while_a_hand_opens(route):
+    """The closed hand pulls at the rock; while it opens it presses, with 4.4 N."""
+
+    def capped(most):
+        cap = ForceCap(largest_force=(None, None, (-1e4, most)))
+        return plan_climb(replace(route, limits=Limits(per_hand={"front_left": cap})))
+
+    pressed = []
+    for knot in capped(6.0).knots:
+        (hand,) = (hand for hand in knot.hands if hand.limb == "front_left")
+        assert hand.wrench[2] <= 6.0 * knot.utilisation + 1e-9
+        if knot.phase == "open":
+            pressed.append(hand.wrench[2])
+    assert max(pressed) > 4.0
+    for most, words in ((2.0, r"would need [12]\."), (0.0, "$")):
+        failure = capped(most).failure
+        assert (failure.phase, failure.limb) == ("open", "front_left")
+        assert re.search(
+            f"front_left: the hand may exert no more that way.*{words}", failure.reason
+        )
+
+
+def test_plans_of_least_effort_leave_room_between_them(route):
+    """They use all of the cap, from which spines that let go would take the hands beyond it."""
+    found = plan_climb(replace(route, objective="min_effort"))
+    assert found.failure is None
+    stages = [knot.utilisation for knot in found.knots if knot.stage is not None]
+    assert stages == pytest.approx([1.0] * 4, abs=1e-5)
+    check_knots(found)
+    check_between(found, [0.5])
+
+
 def test_a_move_of_the_whole_scene_changes_no_utilisation(route, climb):
     turn = Rotation.from_rotvec([0.3, -0.5, 1.1]).as_matrix()
     by = Pose(np.array([1.0, -2.0, 0.7]), turn)
@@ -309,6 +349,9 @@ def test_what_a_climb_cannot_have_is_refused(route):
     with pytest.raises(UnsupportedError) as raised:
         plan_climb(replace(route, load=Load(angular_acceleration=(0.1, 0.0, 0.0))))
     assert raised.value.field == "load.angular_acceleration"
+    with pytest.raises(UnsupportedError, match="comes off its rock") as raised:
+        plan_climb(replace(route, limits=Limits(palm_margin=2.0)))
+    assert raised.value.field == "limits.palm_margin"
     (move,) = route.moves
     given = replace(move, joints={"rear_left": np.zeros(7)})
     with pytest.raises(UnsupportedError) as raised:

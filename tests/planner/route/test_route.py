@@ -120,7 +120,16 @@ def test_margin_is_the_cap_minus_the_utilisation(route, tmp_path: Path, cap):
 
 
 def test_the_table_tells_every_stage_and_the_summary_its_crux(result, tmp_path: Path):
-    files = write_report(result, tmp_path / "new" / "folder")
+    folder = tmp_path / "new" / "folder"
+    folder.mkdir(parents=True)
+    for name in ("climb.png", "support.png"):
+        (folder / name).write_text("of an earlier climb")
+    files = write_report(result, folder)
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "margin.png",
+        "stages.csv",
+        "summary.json",
+    ]
     with files["table"].open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     assert [*rows[0], "sentence"] == list(summary(result)["crux"])

@@ -102,3 +102,33 @@ def test_a_bad_trajectory_names_its_file_and_its_line(knots, tmp_path):
     file.write_bytes(b"")
     with pytest.raises(InvalidInputError, match="no knots"):
         read_trajectory(tmp_path)
+
+
+def edited(line: bytes, edit) -> bytes:
+    knot = json.loads(line)
+    edit(knot)
+    return json.dumps(knot).encode() + b"\n"
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        (lambda knot: knot.update(index=7), "index must be 2, got 7: knots are missing"),
+        (lambda knot: knot["joints"].pop("front_left"), "joints must be of the same limbs"),
+        (lambda knot: knot["joints"]["front_left"].pop(), "joints must be of the same limbs"),
+        (lambda knot: knot["hands"].pop(), "hands must be of the same limbs"),
+        (lambda knot: knot["hands"].reverse(), "hands must be of the same limbs"),
+        (lambda knot: knot["hands"][0]["tensions"].pop(), "must be 4, none below zero"),
+        (lambda knot: knot["hands"][0].update(tensions=[1, 1, -1, 1]), "must be 4, none below"),
+        (lambda knot: knot["body"].update(position=[0, 0]), "body must have three"),
+        (lambda knot: knot["body"].update(orientation=[0, 0, 1]), "a unit quaternion"),
+        (lambda knot: knot["body"].update(orientation=[0, 0, 0, 0]), "a unit quaternion"),
+        (lambda knot: knot.update(time=1e308), "time must be at most"),
+    ],
+)
+def test_an_edited_knot_is_refused_before_anything_moves(edit, words, knots, tmp_path):
+    lines = msgspec.json.Encoder().encode_lines(knots).splitlines(keepends=True)
+    (tmp_path / "trajectory.jsonl").write_bytes(lines[0] + lines[1] + edited(lines[2], edit))
+    with pytest.raises(InvalidInputError, match="line 3: ") as raised:
+        read_trajectory(tmp_path)
+    assert words in str(raised.value)

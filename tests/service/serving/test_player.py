@@ -16,6 +16,7 @@ import pytest
 import zenoh
 from scipy.spatial.transform import Rotation
 
+from hand_models.base import UnsupportedError
 from service.bulk import write_trajectory
 from service.commands.cli import run_command_line
 from service.replies import KnotReply
@@ -48,7 +49,8 @@ def robot(listening) -> DryRobot:
 
 def climb_folder(folder: Path, knots: list[KnotReply], failure: dict | None = None) -> Path:
     write_trajectory(knots, folder)
-    about = {"route": "two moves", "robot": "robosimian", "climb": {"failure": failure}}
+    end = {"failure": failure, "knots": len(knots)}
+    about = {"route": "two moves", "robot": "robosimian", "climb": end}
     (folder / "summary.json").write_text(json.dumps(about))
     return folder
 
@@ -140,6 +142,14 @@ def test_what_comes_late_is_told(knots, listening, robot, monkeypatch: pytest.Mo
     assert max(delays) > 0.004
 
 
+def test_many_set_points_between_two_knots_are_evenly_spaced(knots):
+    slow = [msgspec.structs.replace(knot, time=45.0 * knot.index) for knot in knots[:2]]
+    points = list(climb_set_points(slow, 0.01))
+    assert [each.time for each in points] == pytest.approx(np.arange(4501) / 100.0)
+    assert points[-1].body == slow[1].body
+    assert points[-1].joints == slow[1].joints
+
+
 def test_nobody_is_played_to_where_nobody_listens(knots):
     config = zenoh_config(mode="peer", settings=["listen/endpoints:[]"], multicast=False)
     with (
@@ -187,9 +197,34 @@ def test_what_cannot_be_played_is_refused(knots, tmp_path, capfd):
     write_trajectory(knots, tmp_path)
     assert run_command_line(["play", str(tmp_path)]) == BAD_INPUT
     assert "summary.json: No such file" in complaint(capfd)
+    climb_folder(tmp_path, knots)
+    write_trajectory(knots[:-1], tmp_path)
+    assert run_command_line(["play", str(tmp_path)]) == BAD_INPUT
+    assert f"ends after {len(knots) - 1} knots, the climb of summary.json has" in complaint(capfd)
     unsure = [msgspec.structs.replace(knot, verified=knot.index != 2) for knot in knots]
     assert run_command_line(["play", str(climb_folder(tmp_path, unsure))]) == BAD_INPUT
     assert "knot 2 is not verified" in complaint(capfd)
+
+
+def test_a_second_player_is_refused_while_the_first_one_plays(knots, listening, robot, tmp_path):
+    folder = climb_folder(tmp_path, knots)
+    flags = ["-m", "client", "-e", listening[1], "--no-multicast-scouting", "--wait", "30"]
+    first = begun("play", str(folder), *flags, "--rate", "50")
+    until(lambda: len(robot.taken) >= 5, first)
+    with (
+        open_session(client_config(listening[1])) as session,
+        pytest.raises(UnsupportedError, match="another player sends set-points"),
+    ):
+        play(session, "robosimian", knots, rate=100.0, speed=50.0, wait=30.0)
+    first.send_signal(signal.SIGINT)
+    ended(first)
+    robot.wait()
+    assert [points.number for points in robot.taken] == list(range(len(robot.taken)))
+    again = DryRobot(listening[0])
+    with open_session(client_config(listening[1])) as session:
+        play(session, "robosimian", knots, rate=100.0, speed=50.0, wait=30.0)
+    again.wait()
+    assert again.taken[-1].state == "done"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
