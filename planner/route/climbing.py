@@ -17,6 +17,7 @@ from itertools import islice, pairwise
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError, Pose
+from planner.deadline import DeadlineError
 from planner.motion import (
     BranchEndError,
     NoWayError,
@@ -286,6 +287,10 @@ class _Planner:
         self._phase = phase
         try:
             yield
+        except DeadlineError as error:
+            count = len(self._route.moves)
+            done = f"the climb was planned, at the {phase} of move {self._move} of {count}"
+            raise DeadlineError(error.seconds, done) from error
         except (NoPlanError, UnreachableError, BranchEndError, NoWayError) as error:
             failure = Failure(self._move, phase, self._limb, str(error))
             raise _BlockedError(failure) from error

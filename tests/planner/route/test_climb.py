@@ -19,6 +19,7 @@ from planner import (
     Question,
     Route,
     Stance,
+    deadline,
     plan_climb,
     robosimian,
     settle_each,
@@ -423,3 +424,14 @@ def test_random_moves():
         check_clear(found)
         check_between(found, rng.uniform(size=5))
     assert whole >= 20
+
+
+def test_a_deadline_says_how_far_the_climb_is(monkeypatch):
+    route = questions.route_of(read_route("six-moves"))
+
+    def expire(done: int, count: int) -> None:
+        monkeypatch.setattr("planner.deadline.clock.time.perf_counter", lambda: float("inf"))
+
+    said = "before the climb was planned, at the shift of move 2 of 6"
+    with deadline.within(600.0), pytest.raises(deadline.DeadlineError, match=said):
+        plan_climb(route, progress=expire)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from itertools import pairwise
 from pathlib import Path
@@ -121,10 +122,12 @@ def test_the_largest_change_of_a_tension_counts_between_knots(tmp_path, capfd):
 def test_a_climb_that_fails_says_where_and_why(tmp_path, capfd):
     out = tmp_path / "out"
     route = file_of(blocked(), tmp_path)
-    assert run_command_line(["route", route, "-o", str(out)]) == OVERLOADED
+    # the route has no joints, so that its stages decide
+    assert run_command_line(["route", route, "-o", str(out)]) == 0
     printed = capfd.readouterr().out
     assert max(map(len, printed.replace(str(tmp_path), "").splitlines())) <= 80
     words = " ".join(printed.split())
+    assert "stages are planned without" in words
     failure = failed().climb.failure
     assert f"move 2 fails (shift): {failure.reason}" in words
     assert read_climb_summary(out).climb.failure == ClimbFailureReply.of(failure)
@@ -133,6 +136,21 @@ def test_a_climb_that_fails_says_where_and_why(tmp_path, capfd):
     assert len([*(out / "stages").iterdir()]) == len(failed().result.stages)
     moves = json.loads((out / "summary.json").read_text())["climb"]["moves"]
     assert [move["complete"] for move in moves] == [True, True]
+
+
+def test_a_climb_that_fails_counts_if_the_route_has_joints():
+    climb = failed().climb
+    assert not climb.fails
+    assert not climb.stage_joints
+    start = dataclasses.replace(climb.route.start, joints="solve")
+    climb = dataclasses.replace(climb, route=dataclasses.replace(climb.route, start=start))
+    assert climb.fails
+    assert [*climb.stage_joints] == [0, 1, 2]
+
+
+@pytest.mark.slow
+def test_the_bundled_climb_that_fails_is_no_success(tmp_path):
+    assert run_command_line(["route", "knobs-blocked", "-o", str(tmp_path), "-q"]) == OVERLOADED
 
 
 @pytest.mark.slow
