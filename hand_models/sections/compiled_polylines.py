@@ -161,10 +161,12 @@ def equal_parts(
     """
     count = len(chain) - 1
     at, near, step = np.zeros(count + 1), np.zeros(count + 1, np.bool_), np.diff(chain)
+    whole = 0.0
     for i in range(count):
         part = -(chain[i] * step[i].conjugate()).real / max(sizes[i] * sizes[i], 1e-24)
         near[i] = abs(chain[i] + min(max(part, 0.0), 1.0) * step[i]) <= reach
-    most = int(sizes.sum() / spacing) + 2 * count + 2
+        whole += sizes[i] if near[i] else 0.0
+    most = int(whole / spacing) + 2 * count + 2
     points, lengths = np.empty(most, np.complex128), np.empty(most)
     total = first = 0
     for i in range(count):

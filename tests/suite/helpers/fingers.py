@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -199,6 +200,21 @@ def from_lines(pieces: Sequence[np.ndarray], points: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(away - part[..., None] * step, axis=-1).min(axis=1))
 
 
+def _loads_of_all_spines(closed: ClosedFinger, opened: OpenFinger) -> np.ndarray:
+    """Return shears, normals and stop torques, (3, 3, 2), if no tile had few spines.
+
+    The joint of a tile with few is taken as locked: only with all of its load it is in balance.
+    """
+    finger, of_tile = closed.finger, opened.base_tile
+    whole = [replace(contact, bearing_share=1.0) for contact in finger.contacts]
+    if whole == list(finger.contacts):
+        return np.array(closed[1:4])
+    finger = SettledFinger(finger.model, tuple(whole))
+    shears = finger.shears(opened.tension, of_tile)
+    normals = finger.normals(shears, of_tile)
+    return np.array([shears, normals, finger.stop_torques(shears, normals, of_tile)])
+
+
 def faults(on_hold: OnHold, closed: ClosedFinger) -> list[str]:
     """What is wrong with a closed finger; nothing if it stands as Section 5 has it."""
     opened, clearance = on_hold
@@ -230,7 +246,7 @@ def faults(on_hold: OnHold, closed: ClosedFinger) -> list[str]:
         wrong.append("not as many joints held as phalanges bear")
     # in balance at the closing tension; stops only push
     powers = np.array([1.0, tension])
-    shear, normal, stop = (values @ powers for values in closed[1:4])
+    shear, normal, stop = _loads_of_all_spines(closed, opened) @ powers
     left = torques(finger, tension, opened.base_tile, shear, normal)
     for i, contact in enumerate(finger.contacts):
         held = {"upper": max(left[i], 0.0), "lower": min(left[i], 0.0)}.get(contact.stop or "", 0.0)
@@ -239,6 +255,7 @@ def faults(on_hold: OnHold, closed: ClosedFinger) -> list[str]:
         if abs(left[i] - stop[i]) > 1e-9 * max(1.0, np.abs(normal).max()):
             wrong.append(f"the torque at joint {i} is not what it is said to be")
     # what presses is on the rock, what pulls is held
+    shear, normal = (values @ powers for values in closed[1:3])
     local = (1.0 - model.friction) ** (np.arange(3) + (1 if opened.base_tile else 0))
     drag = local * np.array(model.engagement) * tension
     surface = opened.surface
