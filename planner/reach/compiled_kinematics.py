@@ -12,6 +12,15 @@ __all__ = ["hand_frames", "limb_centres", "solve_poses"]
 
 
 @compiled()
+def _put_coupled(coupling: Array, offset: Array, x: Array, q: Array) -> None:
+    """Write the places of all k joints, coupled ones too, at joint angles x (n,)."""
+    for i in range(len(q)):
+        q[i] = offset[i]
+        for j in range(len(x)):
+            q[i] += coupling[i, j] * x[j]
+
+
+@compiled()
 def _joint_frames(
     turns: Array, shifts: Array, axes: Array, slides: Array, q: Array, frames: Array, along: Array
 ) -> None:
@@ -73,14 +82,11 @@ def hand_frames(
 
     The other parameters are the attributes of `LimbChain`.
     """
-    k, n = coupling.shape
+    k = len(coupling)
     frames, along, q = np.empty((k, 3, 4)), np.empty((k, 3)), np.empty(k)
     found = np.empty((len(angles), 3, 4))
     for s in range(len(angles)):
-        for i in range(k):
-            q[i] = offset[i]
-            for j in range(n):
-                q[i] += coupling[i, j] * angles[s, j]
+        _put_coupled(coupling, offset, angles[s], q)
         _joint_frames(turns, shifts, axes, slides, q, frames, along)
         _hand_frame(frames[k - 1], hand, found[s])
     return found
@@ -102,14 +108,11 @@ def limb_centres(
 
     The other parameters are the attributes of `LimbChain`.
     """
-    k, n = coupling.shape
+    k = len(coupling)
     frames, along, q = np.empty((k, 3, 4)), np.empty((k, 3)), np.empty(k)
     found = np.zeros((len(angles), 3))
     for s in range(len(angles)):
-        for i in range(k):
-            q[i] = offset[i]
-            for j in range(n):
-                q[i] += coupling[i, j] * angles[s, j]
+        _put_coupled(coupling, offset, angles[s], q)
         _joint_frames(turns, shifts, axes, slides, q, frames, along)
         for i in range(k):
             for a in range(3):
@@ -229,10 +232,7 @@ def solve_poses(
                 x[j] = min(max(starts[t, s, j], lower[j]), upper[j])
             before, solved = np.inf, False
             for turn in range(steps + 1):
-                for i in range(k):
-                    q[i] = offset[i]
-                    for j in range(n):
-                        q[i] += coupling[i, j] * x[j]
+                _put_coupled(coupling, offset, x, q)
                 _joint_frames(turns, shifts, axes, slides, q, frames, along)
                 _hand_frame(frames[k - 1], hand, at)
                 for a in range(3):

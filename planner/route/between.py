@@ -27,8 +27,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array, Pose, skew, turns_about, wrench_transport
+from hand_models.base import Array, Pose, skew, wrench_transport
 from hand_models.wrench_spaces import WRENCH_SCALE
+from planner.motion import pose_between
 from planner.route.com_travel import mass_travel, turn_between
 from planner.route.held import HeldPosture, Posed, hold_with
 from planner.route.hold_rows import HoldRows
@@ -69,10 +70,9 @@ class Passage:
     def posed(self, t: float) -> Posed:
         """Return the posture that is interpolated at a time t from 0 to 1."""
         start, end = self.start.posed, self.end.posed
-        place = _mixed(start.body.position, end.body.position, t)
         body = start.body
         if start.body is not end.body:
-            body = Pose(place, start.body.rotation @ turns_about(t * self.turn))
+            body = pose_between(start.body, end.body, t)
         angles = {limb: _mixed(at, end.angles[limb], t) for limb, at in start.angles.items()}
         moving = end.moving
         if moving is not None and start.moving is not None:

@@ -16,7 +16,7 @@ from itertools import islice, pairwise
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, Pose
+from hand_models.base import Array, Pose
 from planner.deadline import DeadlineError
 from planner.motion import (
     BranchEndError,
@@ -83,13 +83,6 @@ def plan_climb(
     if route.start.joints is None:
         solved = replace(route, start=replace(route.start, joints="solve"))
     refuse(solved)
-    least = KnotNumbers.bundled().least_change
-    if route.limits.tension_change is not None and route.limits.tension_change < least:
-        raise InvalidInputError(
-            f"must be at least {least:g} N in a climb, which would have too many knots, got "
-            f"{route.limits.tension_change:g}; a controller interpolates between knots",
-            field="limits.tension_change",
-        )
     planner, failure = _Planner(solved, (settings or ClimbSettings()).complete()), None
     try:
         planner.begin()

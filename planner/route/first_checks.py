@@ -11,6 +11,7 @@ from planner.motion import CollisionScene, rocks_of
 from planner.prepare import settle_each
 from planner.route.climb import Route, RouteStage, in_route, stages
 from planner.route.evaluation import must_touch
+from planner.route.settings import KnotNumbers
 
 __all__ = ["checked_stages", "climb_scene", "refuse"]
 
@@ -20,6 +21,8 @@ def refuse(route: Route) -> None:
 
     Raises
     ------
+    InvalidInputError
+        If tensions may change by so little that there would be too many knots.
     UnsupportedError
         If a wrist is not fixed, a hand's wrench is given, the body accelerates about an axis, palms
         have a margin, or a move gives joint angles of a limb that stays.
@@ -59,6 +62,13 @@ def refuse(route: Route) -> None:
                     f"kinematics; give angles of {move.hand.limb} only",
                     field=f"moves[{i}].joints.{limb}",
                 )
+    least = KnotNumbers.bundled().least_change
+    if route.limits.tension_change is not None and route.limits.tension_change < least:
+        raise InvalidInputError(
+            f"must be at least {least:g} N in a climb, which would have too many knots, got "
+            f"{route.limits.tension_change:g}; a controller interpolates between knots",
+            field="limits.tension_change",
+        )
 
 
 def checked_stages(route: Route) -> tuple[RouteStage, ...]:
