@@ -68,7 +68,7 @@ def equation_6(settled, i, tension):
             share, normal = contact.bearing_share, settled.axes[tile, 1]
             own = axis @ np.cross(settled.positions[tile] - joints[j], normal)
             row *= share
-            row[2 * j : 2 * j + 2] += (1.0 - share) * own * (normal @ np.array([frame.along, up]).T)
+            row[2 * j : 2 * j + 2] += (1.0 - share) * own * (np.array([frame.along, up]) @ normal)
             rows.append(row)
             torque = model.joint_stiffness[j] * angle - tension * model.pulley_radii[j]
             values.append(share * torque)

@@ -49,6 +49,12 @@ def rough_stance(rng: np.random.Generator) -> Stance:
     return replace(stance, hands=tuple(hands))
 
 
+def contacts(stance: Stance):
+    """What touches, and which joints stand at limits."""
+    hands = [settle_hand(hand, stance) for hand in stance.hands]
+    return [(hand.postures.kinds.tolist(), hand.postures.stops.tolist()) for hand in hands]
+
+
 def optimal_questions(draw, seeds) -> Iterator[tuple[int, Question, float]]:
     """Random stances that hold, and how much of their hands they need."""
     for seed in seeds:
@@ -72,40 +78,44 @@ def changes(question: Question, before: float, seed: int, far: float, turn: floa
         except InvalidInputError as error:
             # the rock is a little deeper in a finger, or one comes to no rest on it
             print(seed, k, error)
-            yield math.inf
+            yield math.inf, True
             continue
         assert answer.verified
         change = abs(answer.utilisation / before - 1.0)
+        lost = change > 0.1 and contacts(question.stance) != contacts(there)
         if change > 0.1:
             holds = [type(hand.hold).__name__ for hand in there.hands]
-            print(seed, k, f"{before:.3f} {answer.utilisation:.3f}", holds)
-        yield change
+            print(seed, k, f"{before:.3f} {answer.utilisation:.3f}", holds, lost)
+        yield change, lost
 
 
 @pytest.mark.slow
 def test_plans_change_little_where_rock_is_a_little_elsewhere():
     """Beyond 10 % in some 2 % of moves; most have a hand on a plane or an edge.
 
-    There small angles move pressures far.
+    There small angles move pressures far. None of them loses or finds a contact.
     """
-    change = [
+    found = [
         each
         for seed, question, before in optimal_questions(random_stance, range(400, 700))
         for each in changes(question, before, seed, 5e-5, 3e-4)
     ]
-    assert len(change) >= 25 * TIMES
+    assert len(found) >= 25 * TIMES
+    change, lost = np.array(found).T
     assert np.median(change) < 0.015
-    assert (np.array(change) > 0.1).mean() < 0.05
+    assert (change > 0.1).mean() < 0.05
+    assert not lost.any()
 
 
 @pytest.mark.slow
 def test_plans_on_rough_rock_are_much_the_same_a_little_elsewhere():
     """By 2 % in the median, 19 % at the 95th percentile."""
-    change = [
+    found = [
         each
         for seed, question, before in optimal_questions(rough_stance, range(40))
         for each in changes(question, before, seed, 2e-4, 2e-3)
     ]
-    assert len(change) >= 15 * TIMES
+    assert len(found) >= 15 * TIMES
+    change, _ = np.array(found).T
     assert np.median(change) < 0.05
     assert np.percentile(change, 95) < 0.25
