@@ -1,4 +1,4 @@
-"""A hand of the caller's own: files with some of its numbers, in every command and over zenoh."""
+"""A hand of the caller's own: files with some of its numbers, in every command."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ from service.answering.questions import question
 from service.commands.cli import run_command_line
 from service.requests import PlanRequest
 from service.wire import decode_request
+from tests.suite.helpers.commands import result
 from tests.suite.helpers.hands import PINCH, ROCK, entry_toml
-from tests.suite.helpers.own_hands import THICK, own, request_for, told
+from tests.suite.helpers.own_hands import THICK, own, request_for
 from tests.suite.helpers.requests import put, wall_request
 from tests.suite.helpers.rocks import cylinder_mesh
 
@@ -364,10 +365,10 @@ def test_a_file_that_is_none_is_refused(
 
 def test_a_plan_is_for_the_hand_of_the_file(file, capfd: pytest.CaptureFixture[str]) -> None:
     assert run_command_line(["plan", "wall-300", "--json"]) == 0
-    assert told(capfd)["limiting"]["limit"] != "tendon_tension"
+    assert result(capfd)["limiting"]["limit"] != "tendon_tension"
     path = file(entry_toml("tendon", "maximum_tension", 60.0))
     assert run_command_line(["plan", "wall-300", "--json", "--hand", path]) == 3
-    reply = told(capfd)
+    reply = result(capfd)
     assert reply["limiting"]["limit"] == "tendon_tension"
     tensions = [f["tendon_tension"] for hand in reply["hands"] for f in hand["fingers"]]
     assert max(tensions) / 60.0 == pytest.approx(reply["utilisation"], rel=1e-6)
@@ -386,7 +387,7 @@ def test_the_file_has_the_last_word_over_the_stance(
         3,
     )
     weight = 9.81 * (robosimian().mass + 4 * 2.0)
-    got = told(capfd)
+    got = result(capfd)
     np.testing.assert_allclose(np.linalg.norm(got["body_wrench"][:3]), weight, rtol=1e-9)
     both = own_hand(THICK.replaced(own("hand", "mass", 4.6)))
     want = dispatch.answer_plan(with_hand(request_for(mass=None), both))
@@ -409,7 +410,7 @@ def test_a_wrench_space_takes_a_limb_and_a_file(file, capfd: pytest.CaptureFixtu
             run_command_line(["wrench-space", "wall-300", "--json", "--hand", "front_left", *more])
             == 0
         )
-        rows = told(capfd)["rows"]
+        rows = result(capfd)["rows"]
         limits[len(more)] = {row["capacity"] for row in rows if row["limit"] == "tendon_tension"}
     assert limits == {0: {700.0}, 2: {60.0}}
     for given in (["--hand", path], ["--hand", "front_left", "--hand", "rear_left"]):
@@ -426,7 +427,7 @@ def test_a_route_is_climbed_with_the_hand(
     for workers in ("1", "2"):
         flags = ["--json", "--hand", path, "--workers", workers]
         assert run_command_line(["route", "six-moves", "-o", str(tmp_path / workers), *flags]) == 3
-        assert told(capfd)["feasible"] is False
+        assert result(capfd)["feasible"] is False
         tables[workers] = (tmp_path / workers / "stages.csv").read_text()
     assert tables["1"] == tables["2"]
     assert "hand_load" in tables["1"]
@@ -440,7 +441,7 @@ def test_the_demo_asks_for_the_hand(
     assert (
         run_command_line(["demo", "-o", str(tmp_path / "demo.png"), "--json", "--hand", path]) == 3
     )
-    assert told(capfd)["limiting"]["limit"] == "tendon_tension"
+    assert result(capfd)["limiting"]["limit"] == "tendon_tension"
     assert (tmp_path / "demo.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -449,7 +450,7 @@ def test_a_study_is_of_the_hand_and_says_so(
 ) -> None:
     path = file(entry_toml("palm", "spring_stiffness", 400.0))
     assert run_command_line(["study", "fig06", "-o", str(tmp_path), "--json", "--hand", path]) == 0
-    reply = told(capfd)
+    reply = result(capfd)
     assert reply["hand"]["palm"]["spring_stiffness"]["value"] == 400.0
     k1, k2, mu, kp = 2200.0, 1400.0, 0.34, 400.0
     by_hand = (4.0 * k1 * k2 + 2.0 * kp * (k1 + k2)) / ((2.0 - mu) * k1 + 2.0 * kp)
@@ -465,7 +466,7 @@ def test_the_studies_of_the_palm_bear_any_possible_palm(
     path = file(entry_toml("palm", "pulley_friction", friction))
     for name in ("fig06", "fig07"):
         assert run_command_line(["study", name, "-o", str(tmp_path), "--json", "--hand", path]) == 0
-        assert told(capfd)["data"]["friction"] == friction
+        assert result(capfd)["data"]["friction"] == friction
 
 
 def test_the_help_of_study_lists_the_studies(capfd: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""What a stance can hold: against another solver, against plans, and told whole."""
+"""What a stance can hold: against another solver, and against plans."""
 
 import json
 import math

@@ -23,6 +23,7 @@ from service.commands.cli import run_command_line
 from service.requests import PlanRequest, WrenchSpaceRequest
 from service.serving import PlanService, open_session, zenoh_config
 from service.wire import NoServiceError, ServiceError, decode_request, service_key
+from tests.suite.helpers.commands import complaint, result
 from tests.suite.helpers.hands import entry_toml
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.requests import pose, put, wall_request
@@ -90,41 +91,16 @@ def plan_request(request: dict) -> PlanRequest:
     return decode_request(msgspec.json.encode(request), PlanRequest)
 
 
-@pytest.fixture
-def written(tmp_path: Path):
-    """Writes a request, and returns its path."""
-
-    def write(request: dict, name: str = "asked.json") -> str:
-        path = tmp_path / name
-        path.write_text(json.dumps(request))
-        return str(path)
-
-    return write
-
-
-def told(capfd: pytest.CaptureFixture[str]) -> dict:
-    out, err = capfd.readouterr()
-    assert err == ""
-    return json.loads(out)
-
-
-def complaint(capfd: pytest.CaptureFixture[str]) -> str:
-    out, err = capfd.readouterr()
-    assert out == ""
-    assert err.count("\n") == 1
-    return err
-
-
 # Commands -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("joints", [ANGLES, "solve", None])
 def test_a_stance_is_planned_for_the_robot_of_the_file(
-    joints: Any, file: Path, written, capfd: pytest.CaptureFixture[str]
+    joints: Any, file: Path, stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
     request = hanging(file, joints)
-    assert run_command_line(["plan", written(request), "--robot", str(file), "--json"]) == 0
-    reply = told(capfd)
+    assert run_command_line(["plan", stance_file(request), "--robot", str(file), "--json"]) == 0
+    reply = result(capfd)
     robot = robot_of(RobotFile.load(file))
     assert robot.mass == pytest.approx(20.0 + 2 * sum(1 / k for k in range(1, 7)) + 2 * 2.6)
     np.testing.assert_allclose(np.linalg.norm(reply["body_wrench"][:3]), 1.62 * robot.mass)
@@ -151,9 +127,9 @@ def test_a_stance_is_planned_for_the_robot_of_the_file(
 
 @pytest.mark.slow
 def test_a_person_reads_the_torques_of_every_joint(
-    file: Path, written, capfd: pytest.CaptureFixture[str]
+    file: Path, stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    path = written(hanging(file) | {"limits": {"joint_torque": {"left": 8.0}}})
+    path = stance_file(hanging(file) | {"limits": {"joint_torque": {"left": 8.0}}})
     assert run_command_line(["plan", path, "--robot", str(file)]) == 3
     out, err = capfd.readouterr()
     assert err == ""
@@ -170,17 +146,17 @@ def test_a_person_reads_the_torques_of_every_joint(
 
 @pytest.mark.parametrize("named", ["arms", None])
 def test_a_stance_may_name_the_robot_of_the_file_or_none(
-    named: str | None, file: Path, written, capfd: pytest.CaptureFixture[str]
+    named: str | None, file: Path, stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    path = written(put(hanging(file), ("stance", "robot"), named))
+    path = stance_file(put(hanging(file), ("stance", "robot"), named))
     assert run_command_line(["plan", path, "--robot", str(file), "--json"]) == 0
-    assert told(capfd)["status"] == "optimal"
+    assert result(capfd)["status"] == "optimal"
 
 
 def test_a_stance_for_another_robot_is_refused_and_both_are_named(
-    file: Path, written, capfd: pytest.CaptureFixture[str]
+    file: Path, stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    path = written(put(hanging(file), ("stance", "robot"), "robosimian"))
+    path = stance_file(put(hanging(file), ("stance", "robot"), "robosimian"))
     for command in (["plan"], ["query"], ["wrench-space", "--hand", "left"]):
         assert (
             run_command_line([command[0], path, *command[1:], "--robot", str(file), "--json"]) == 2
@@ -188,18 +164,21 @@ def test_a_stance_for_another_robot_is_refused_and_both_are_named(
         words = complaint(capfd)
         assert words.startswith("crux: stance.robot: the stance is for 'robosimian'")
         assert f"{file} describes 'arms'" in words
-    assert run_command_line(["plan", written(put(hanging(file), ("stance", "robot"), "arms"))]) == 2
+    assert (
+        run_command_line(["plan", stance_file(put(hanging(file), ("stance", "robot"), "arms"))])
+        == 2
+    )
     assert "unknown robot 'arms'; known are robosimian" in complaint(capfd)
 
 
 def test_a_stance_with_limbs_of_another_robot_names_those_that_are_there(
-    file: Path, written, capfd: pytest.CaptureFixture[str]
+    file: Path, stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
     assert run_command_line(["plan", "wall-300", "--robot", str(file)]) == 2
     assert complaint(capfd) == (
         "crux: stance.hands[0].limb: unknown limb 'front_right'; known are left, right\n"
     )
-    assert run_command_line(["plan", written(hanging(file, None))]) == 2
+    assert run_command_line(["plan", stance_file(hanging(file, None))]) == 2
     assert "unknown limb 'left'; known are front_right" in complaint(capfd)
 
 
@@ -229,39 +208,39 @@ def test_a_bad_file_is_refused_in_one_line(
 
 
 def test_a_hand_and_a_robot_of_ones_own_go_together(
-    file: Path, written, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    file: Path, stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     hand = tmp_path / "hand.toml"
     hand.write_text(entry_toml("hand", "mass", 5.6))
-    path = written(hanging(file))
+    path = stance_file(hanging(file))
     assert (
         run_command_line(["plan", path, "--robot", str(file), "--hand", str(hand), "--json"]) == 0
     )
-    weight = np.linalg.norm(told(capfd)["body_wrench"][:3])
+    weight = np.linalg.norm(result(capfd)["body_wrench"][:3])
     assert weight == pytest.approx(1.62 * (robot_of(RobotFile.load(file)).mass + 2 * 3.0))
 
 
 def test_a_wrench_space_is_that_of_the_robots_hand(
-    file: Path, written, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    file: Path, stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     picture = tmp_path / "hand.png"
     request = put(hanging(file), ("stance", "hands", 0, "grasp", "lateral"), False)
-    path = written(request)
+    path = stance_file(request)
     flags = ["--robot", str(file), "--plot", str(picture), "--json"]
     assert run_command_line(["wrench-space", path, "--hand", "left", *flags]) == 0
-    reply = told(capfd)
+    reply = result(capfd)
     assert (reply["robot"], reply["limb"]) == ("arms", "left")
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_body_space_is_that_of_the_robot(
-    file: Path, written, capfd: pytest.CaptureFixture[str]
+    file: Path, stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
     assert (
-        run_command_line(["body-space", written(hanging(file)), "--robot", str(file), "--json"])
+        run_command_line(["body-space", stance_file(hanging(file)), "--robot", str(file), "--json"])
         == 0
     )
-    reply = told(capfd)
+    reply = result(capfd)
     assert reply["robot"] == "arms"
     weight = np.linalg.norm(reply["body_wrench"][:3])
     assert weight == pytest.approx(1.62 * robot_of(RobotFile.load(file)).mass)
@@ -271,9 +250,9 @@ def test_a_lighter_robot_takes_the_bundled_stances(
     lemur: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     assert run_command_line(["plan", "wall-300", "--json"]) == 0
-    heavy = told(capfd)
+    heavy = result(capfd)
     assert run_command_line(["plan", "wall-300", "--robot", str(lemur), "--json"]) == 0
-    light = told(capfd)
+    light = result(capfd)
     assert robot_of(RobotFile.load(lemur)).mass == pytest.approx(robosimian().mass - 20.0)
     np.testing.assert_allclose(
         light["body_wrench"][:3],
@@ -286,18 +265,18 @@ def test_a_lighter_robot_takes_the_bundled_stances(
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_route_is_climbed_by_the_robot_in_other_processes_too(
-    workers: int, file: Path, written, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    workers: int, file: Path, stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     request = hanging(file, "solve")
     del request["id"]
     left, right = request["stance"]["hands"]
     higher = {**left, "pose": put(left["pose"], ("position", 2), left["pose"]["position"][2] + 0.9)}
     moves = [left, {**right, "body": request["stance"]["body"]}, higher]
-    path = written(request | {"moves": moves, "objective": "min_effort"})
+    path = stance_file(request | {"moves": moves, "objective": "min_effort"})
     out = tmp_path / "out"
     flags = ["--robot", str(file), "--workers", str(workers), "--json"]
     assert run_command_line(["route", path, "-o", str(out), *flags]) == 3
-    summary = told(capfd)
+    summary = result(capfd)
     assert summary["statuses"]["unreachable"] == 1
     assert summary["crux"]["sentence"].startswith("The crux is move 3, with left on its new hold")
     assert "left is out of reach by " in summary["crux"]["sentence"]
@@ -357,7 +336,7 @@ def flags_to(served: Served) -> list[str]:
 
 @pytest.mark.slow
 def test_serve_and_query_a_robot_and_a_hand(
-    served: Served, file: Path, written, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    served: Served, file: Path, stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     hand = tmp_path / "hand.toml"
     hand.write_text(entry_toml("structure", "held_mass", 20.0))
@@ -365,19 +344,19 @@ def test_serve_and_query_a_robot_and_a_hand(
         service_key("arms", name) for name in dispatch.SERVICES_BY_NAME
     }
     flags = [*flags_to(served), "--robot", str(file), "--hand", str(hand)]
-    assert run_command_line(["query", written(hanging(file)), *flags]) == 0
+    assert run_command_line(["query", stance_file(hanging(file)), *flags]) == 0
     request = with_hand(plan_request(hanging(file)), read_hand(hand))
     want = dispatch.answer_plan(request, robots_of(read_robot(file)))
-    assert told(capfd)["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
+    assert result(capfd)["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
 
 
 @pytest.mark.slow
 def test_a_query_that_names_the_robot_goes_to_its_service(
-    served: Served, file: Path, written, capfd: pytest.CaptureFixture[str]
+    served: Served, file: Path, stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    named = written(put(hanging(file), ("stance", "robot"), "arms"))
+    named = stance_file(put(hanging(file), ("stance", "robot"), "arms"))
     assert run_command_line(["query", named, *flags_to(served)]) == 0
-    assert told(capfd)["status"] == "optimal"
+    assert result(capfd)["status"] == "optimal"
 
 
 @pytest.mark.slow
@@ -398,7 +377,7 @@ def test_the_demo_is_of_the_robot(
 ) -> None:
     picture = tmp_path / "demo.png"
     assert run_command_line(["demo", "-o", str(picture), "--json", "--robot", str(lemur)]) == 0
-    weight = np.linalg.norm(told(capfd)["body_wrench"][:3])
+    weight = np.linalg.norm(result(capfd)["body_wrench"][:3])
     assert weight == pytest.approx(9.81 * robot_of(RobotFile.load(lemur)).mass)
     assert picture.read_bytes().startswith(b"\x89PNG")
 

@@ -9,10 +9,7 @@ import pytest
 from msgspec import structs
 from scipy.stats import spearmanr
 
-from hand_models.parameters import (
-    bundled_draws,
-    draw_table,
-)
+from hand_models.parameters import bundled_draws, draw_table
 from hand_models.rock import Plane
 from hand_models.tile import Surface
 from planner.question import Limits, drawn_hands, drawn_quantities

@@ -25,10 +25,9 @@ from tests.suite.helpers.requests import (
     wall_request,
 )
 
-# Messages -----------------------------------------------------------------------------------------
-
-
 KEY = "crux/robosimian/body_space"
+
+# Messages -----------------------------------------------------------------------------------------
 
 
 def space_request(request: dict | None = None, **more) -> dict:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import msgspec
 import pytest
@@ -18,8 +17,9 @@ from service.commands.cli import run_command_line
 from service.requests import PlanRequest
 from service.serving import CruxClient, PlanService, open_session, zenoh_config
 from service.wire import ServiceError
+from tests.suite.helpers.commands import result
 from tests.suite.helpers.hands import entry_toml
-from tests.suite.helpers.own_hands import THICK, WEAK, own, request_for, told, untimed
+from tests.suite.helpers.own_hands import THICK, WEAK, own, request_for, untimed
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.requests import HEAVY, full_request, put, wall_request
 from tests.suite.helpers.served import Served, client_config, free_endpoint
@@ -57,13 +57,12 @@ def test_two_hands_ask_one_service_and_do_not_disturb_each_other(alone: zenoh.Se
 
 @pytest.mark.slow
 def test_a_service_has_a_hand_of_its_own_and_a_request_the_last_word(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    stance_file: Callable[..., str], capfd: pytest.CaptureFixture[str]
 ) -> None:
     plain = request_for(mass=HEAVY)
     heavy = own("hand", "mass", 12.6)
-    hand, stance = tmp_path / "own.toml", tmp_path / "stance.json"
-    hand.write_text(entry_toml("structure", "held_mass", 20.0))
-    served = Served(free_endpoint(), "--hand", str(hand))
+    hand = stance_file(entry_toml("structure", "held_mass", 20.0), "own.toml")
+    served = Served(free_endpoint(), "--hand", hand)
     default = own("structure", "held_mass", 20.0)
     try:
         with zenoh.open(client_config(served.endpoint)) as session:
@@ -75,14 +74,13 @@ def test_a_service_has_a_hand_of_its_own_and_a_request_the_last_word(
             assert untimed(client.plan(with_hand(plain, back))) == untimed(
                 dispatch.answer_plan(plain)
             )
-        stance.write_text(json.dumps(wall_request(HEAVY)))
         flags = ["-m", "client", "-e", served.endpoint, "--no-multicast-scouting"]
         flags += ["--timeout", str(PATIENCE)]
-        hand.write_text(entry_toml("structure", "held_mass", 45.0))
-        asked = ["query", str(stance), *flags, "--json", "--hand", str(hand)]
+        hand = stance_file(entry_toml("structure", "held_mass", 45.0), "mine.toml")
+        asked = ["query", stance_file(wall_request(HEAVY)), *flags, "--json", "--hand", hand]
         assert run_command_line(asked) in (0, 3)
         want = dispatch.answer_plan(with_hand(plain, own("structure", "held_mass", 45.0)))
-        assert told(capfd)["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
+        assert result(capfd)["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
     finally:
         served.stop(signal.SIGTERM)
 

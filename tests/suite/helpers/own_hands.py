@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import msgspec
-import pytest
 
 from hand_models.parameters import ParameterTable, hand_table
 from service.answering import with_hand
@@ -16,7 +14,7 @@ from service.wire import decode_request
 from tests.suite.helpers.hands import entry_toml
 from tests.suite.helpers.requests import wall_request
 
-__all__ = ["RADII", "THICK", "WEAK", "own", "request_for", "told", "untimed"]
+__all__ = ["THICK", "WEAK", "own", "request_for", "untimed"]
 
 
 def own(section: str, name: str, value: Any) -> ParameterTable:
@@ -35,17 +33,9 @@ def untimed(reply: PlanReply) -> dict:
     return {k: v for k, v in msgspec.to_builtins(reply).items() if k not in ("time", "solver")}
 
 
-RADII = hand_table().vector("finger", "pulley_radii")
-
-
-THICK = own("finger", "pulley_radii", [2.0 * radius for radius in RADII])
+THICK = own(
+    "finger", "pulley_radii", [2.0 * each for each in hand_table().vector("finger", "pulley_radii")]
+)
 """Joint pulleys of twice the radius."""
 
-
 WEAK = own("tendon", "maximum_tension", 60.0)
-
-
-def told(capfd: pytest.CaptureFixture[str]) -> dict:
-    out, err = capfd.readouterr()
-    assert err == ""
-    return json.loads(out)

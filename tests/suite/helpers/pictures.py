@@ -20,8 +20,7 @@ from tests.suite.helpers.hands import ROCK
 from tests.suite.helpers.robots import TWO_LINK, arm, limbs_toml
 from tests.suite.helpers.stances import attainable_wrench, on_wall, wall
 
-__all__ = ["OFF", "answered", "drawn", "panels", "requested", "standing"]
-
+__all__ = ["answered", "drawn", "panels"]
 
 OFF = 0.45
 """How far the body stands off the wall so that RoboSimian's limbs are bent [m]."""

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hand_models.parameters import (
-    ParameterSample,
-    own_draw,
-)
+from hand_models.parameters import ParameterSample, own_draw
 from planner.question import Question
 from service.answering.questions import question
 from service.commands.stances import read_request
@@ -39,7 +36,6 @@ FEW = (
     drawn(90.0, finger=seat(0.0239)),
     drawn(110.0, tile={"engagement": entry([0.14, 0.18, 0.2], "1")}),
 )
-
 
 STRENGTHS = tuple(drawn(strength) for strength in (40.0, 65.0, 80.0, 55.0))
 
