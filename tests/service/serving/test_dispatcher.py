@@ -9,7 +9,6 @@ import queue
 import signal
 import subprocess
 import sys
-import time
 import urllib.request
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -27,7 +26,7 @@ from service.serving.settings import SERVING_SETTINGS
 from service.wire import LostError, service_key
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.odd_answers import never_ready, obedient
-from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.patience import PATIENCE, soon
 from tests.suite.helpers.served import client_config, free_endpoint
 
 PLAN = service_key("robosimian", "plan")
@@ -98,10 +97,14 @@ class Site:
         return client.ask({}, HEALTH)
 
     def wait_until(self, client: Client, so: Callable[[dict], bool]) -> dict:
-        until = time.monotonic() + PATIENCE
-        while not so(health := self.health(client)):
-            assert time.monotonic() < until, health
-            time.sleep(0.02)
+        health: dict = {}
+
+        def reached() -> bool:
+            nonlocal health
+            health = self.health(client)
+            return so(health)
+
+        assert soon(reached), health
         return health
 
 

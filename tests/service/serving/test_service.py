@@ -10,8 +10,7 @@ import re
 import signal
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import msgspec
@@ -32,7 +31,7 @@ from service.wire import (
     ServiceTimeout,
     service_key,
 )
-from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.patience import PATIENCE, soon
 from tests.suite.helpers.replies import check_answer
 from tests.suite.helpers.requests import (
     HEAVY,
@@ -329,16 +328,6 @@ def test_a_second_server_of_one_robot_warns(served: Served) -> None:
         "--no-multicast-scouting keeps services apart"
     ]
     assert serving.startswith("crux: serving ")
-
-
-def soon(said: Callable[[], bool], *, within: float = PATIENCE) -> bool:
-    """Whether something is ever said: tokens take a moment to be heard of."""
-    until = time.monotonic() + within
-    while time.monotonic() < until:
-        if said():
-            return True
-        time.sleep(0.05)
-    return False
 
 
 @pytest.mark.slow

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.suite.helpers.checkout import ROOT
-from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.patience import PATIENCE, soon
 
 PROC = Path("/proc")
 
@@ -33,11 +32,14 @@ def begun(*arguments: str, before: str = "", **more: object) -> subprocess.Popen
 
 def until(true: Callable[[], object], process: subprocess.Popen[bytes]) -> None:
     """Wait for something that comes before the process ends."""
-    end = time.monotonic() + PATIENCE
-    while not true():
+
+    def came() -> bool:
+        if true():
+            return True
         assert process.poll() is None, process.communicate()
-        assert time.monotonic() < end
-        time.sleep(0.01)
+        return False
+
+    assert soon(came)
 
 
 def alive(session: int) -> list[str]:
@@ -67,8 +69,5 @@ def loaded(process: subprocess.Popen[bytes], library: str) -> bool:
 def ended(process: subprocess.Popen[bytes]) -> tuple[int, str]:
     """Its status, and what it says on standard error, once all its processes have ended."""
     _, error = process.communicate(timeout=PATIENCE)
-    end = time.monotonic() + PATIENCE
-    while alive(process.pid):
-        assert time.monotonic() < end, alive(process.pid)
-        time.sleep(0.01)
+    assert soon(lambda: not alive(process.pid)), alive(process.pid)
     return process.returncode, error.decode()
