@@ -15,6 +15,13 @@ from .capability import (
     com_solid as com_solid,
     survey as survey,
 )
+from .certification import (
+    BoundCheck as BoundCheck,
+    ClimbCertificate as ClimbCertificate,
+    RouteCheck as RouteCheck,
+    check_bound as check_bound,
+    check_route as check_route,
+)
 from .deadline import (
     DeadlineError as DeadlineError,
 )
@@ -143,4 +150,16 @@ from .solving import (
 )
 from .streaming import (
     WrenchStream as WrenchStream,
+)
+from .walls import (
+    BodyGrid as BodyGrid,
+    BodyPoses as BodyPoses,
+    MadeWall as MadeWall,
+    PlaceGrid as PlaceGrid,
+    WallProgress as WallProgress,
+    WallSource as WallSource,
+    read_wall as read_wall,
+    wall_digest as wall_digest,
+    wall_of as wall_of,
+    write_wall as write_wall,
 )

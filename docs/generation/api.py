@@ -33,6 +33,7 @@ ROOMS = {
         "motion",
         "reach",
         "screening",
+        "certification",
         "capability",
         "streaming",
         "scene",

@@ -13,12 +13,14 @@ from .hold_trials import (
     FoundHold as FoundHold,
     HoldRank as HoldRank,
     HoldTrial as HoldTrial,
+    closed_holds as closed_holds,
     grid_of_trials as grid_of_trials,
     ranked_holds as ranked_holds,
     try_holds as try_holds,
 )
 from .kept_hands import (
     ClosedPlacement as ClosedPlacement,
+    input_digests as input_digests,
     read_hands as read_hands,
     write_hands as write_hands,
 )

@@ -41,6 +41,7 @@ __all__ = [
     "FoundHold",
     "HoldRank",
     "HoldTrial",
+    "closed_holds",
     "grid_of_trials",
     "ranked_holds",
     "try_holds",
@@ -220,6 +221,47 @@ def _at_border(hand: SpinyHand, settled: SettledHand) -> bool:
     )
 
 
+def closed_holds(
+    hand: SpinyHand,
+    rock: Mesh,
+    surface: Surface,
+    trials: Sequence[HoldTrial],
+    seat: str = "rest",
+    *,
+    placing: str = "given",
+) -> list[SettledHand | InvalidInputError]:
+    """Close hands at places, all together.
+
+    Parameters as in `try_holds`.
+
+    Returns
+    -------
+    list of SettledHand or InvalidInputError
+        Hands in the order of the trials; an error, with the reason, where one cannot be. A place
+        where the scan ends within a finger's reach is an error, too: the finger would take the
+        scan's border for an edge.
+    """
+    placements = [
+        Placement(rock, surface, Grasp(each.outer_rotation), None, _approach(each))
+        for each in trials
+    ]
+    outcomes = best_seats(hand, placements) if seat == "best" else hand.settle_each(placements)
+    if placing == "contact":
+        seated = [each for each in outcomes if isinstance(each, SettledHand)]
+        rests = iter(placed_by_contact(hand, seated))
+        outcomes = [next(rests) if isinstance(each, SettledHand) else each for each in outcomes]
+    return [
+        RefusedPlaceError(AT_BORDER, reason="scan_border", field="place.point")
+        if isinstance(each, SettledHand) and _at_border(hand, each)
+        else each
+        for each in outcomes
+    ]
+
+
+def _approach(trial: HoldTrial) -> Pose:
+    return approach_frame(trial.point, trial.approach, trial.wrist_angle, ALONG_FINGERS)
+
+
 def try_holds(
     hand: SpinyHand,
     rock: Mesh,
@@ -252,37 +294,18 @@ def try_holds(
     Returns
     -------
     list of FoundHold or InvalidInputError
-        Hands in the order of the trials; an error, with the reason, where one cannot be. A place
-        where the scan ends within a finger's reach is an error, too: the finger would take the
-        scan's border for an edge.
+        Hands in the order of the trials; an error, with the reason, where one cannot be
+        (`closed_holds`).
     """
-    placements = [
-        Placement(
-            rock,
-            surface,
-            Grasp(each.outer_rotation),
-            None,
-            approach_frame(each.point, each.approach, each.wrist_angle, ALONG_FINGERS),
-        )
-        for each in trials
-    ]
-    outcomes = best_seats(hand, placements) if seat == "best" else hand.settle_each(placements)
-    if placing == "contact":
-        seated = [each for each in outcomes if isinstance(each, SettledHand)]
-        rests = iter(placed_by_contact(hand, seated))
-        outcomes = [next(rests) if isinstance(each, SettledHand) else each for each in outcomes]
+    outcomes = closed_holds(hand, rock, surface, trials, seat, placing=placing)
     spaces = iter(wrench_spaces([each for each in outcomes if isinstance(each, SettledHand)]))
     found: list[FoundHold | InvalidInputError] = []
     directions = force_directions()
-    for placement, outcome in zip(placements, outcomes, strict=True):
+    for trial, outcome in zip(trials, outcomes, strict=True):
         if isinstance(outcome, InvalidInputError):
             found.append(outcome)
             continue
         space = next(spaces)
-        if _at_border(hand, outcome):
-            refused = RefusedPlaceError(AT_BORDER, reason="scan_border", field="place.point")
-            found.append(refused)
-            continue
         support = pure = np.full(len(TRIAL_WAYS), math.nan)
         try:
             support = np.array([space.support(way) for way in directions])
@@ -297,7 +320,7 @@ def try_holds(
                 outcome,
                 directions,
                 samples,
-                at=placement.at if seat == "rest" else None,
+                at=_approach(trial) if seat == "rest" else None,
                 pure=directions,
                 force=force,
             )

@@ -33,7 +33,7 @@ from hand_models.hand import (
 from hand_models.rock import Mesh
 from hand_models.tile import Surface
 
-__all__ = ["ClosedPlacement", "read_hands", "write_hands"]
+__all__ = ["ClosedPlacement", "input_digests", "read_hands", "write_hands"]
 
 FILE_FORMAT: Final = "crux closed hands 2"
 """First array of a file of closed hands."""
@@ -102,7 +102,9 @@ def write_hands(closed: Sequence[ClosedPlacement], path: Path) -> None:
     given = [_given(each.placement) for each in closed]
     arrays: dict[str, Any] = {
         "format": FILE_FORMAT,
-        "made_with": _inputs(first.hold, first.surface, first.hand.table.sections),
+        "made_with": list(
+            input_digests(first.hold, first.surface, first.hand.table.sections).values()
+        ),
         "grasp": [msgspec.json.encode(each.grasp).decode() for each in hands],
         "closing_tension": [each.closing_tension for each in hands],
         "given": [kind for kind, _ in given],
@@ -151,12 +153,10 @@ def read_hands(path: Path, rock: Mesh, surface: Surface, hand: SpinyHand) -> lis
         arrays = {name: file[name] for name in file.files}
         if str(arrays.get("format")) != FILE_FORMAT:
             raise InvalidInputError(f"is not a file of closed hands: {path}", field="file")
-        now = _inputs(rock, surface, hand.table.sections)
+        now = input_digests(rock, surface, hand.table.sections)
         differ = [
             name
-            for name, was, there in zip(
-                ("rock", "surface", "hand"), arrays["made_with"].tolist(), now, strict=True
-            )
+            for (name, there), was in zip(now.items(), arrays["made_with"].tolist(), strict=True)
             if was != there
         ]
         if differ:
@@ -200,16 +200,16 @@ def _pose(matrix: Array) -> Pose:
     return Pose(position, rotation)
 
 
-def _inputs(rock: Mesh, surface: Surface, sections: Any) -> list[str]:
-    """Return digests of a rock's triangles, a surface and a hand's numbers."""
+def input_digests(rock: Mesh, surface: Surface, sections: Any) -> dict[str, str]:
+    """Return SHA-256 digests of a rock's triangles, a surface and a hand's numbers, by name."""
     triangles = sha256(rock.triangles.vertices.tobytes())
     triangles.update(np.ascontiguousarray(rock.triangles.faces).tobytes())
     numbers = sorted((key, sorted(entries.items())) for key, entries in sections.items())
-    return [
-        triangles.hexdigest(),
-        sha256(repr(replace(surface, name=None)).encode()).hexdigest(),
-        sha256(repr(numbers).encode()).hexdigest(),
-    ]
+    return {
+        "rock": triangles.hexdigest(),
+        "surface": sha256(repr(replace(surface, name=None)).encode()).hexdigest(),
+        "hand": sha256(repr(numbers).encode()).hexdigest(),
+    }
 
 
 def _closed(

@@ -26,4 +26,5 @@ from .tables import (
     spine_table as spine_table,
     strength_table as strength_table,
     surface_table as surface_table,
+    wall_table as wall_table,
 )

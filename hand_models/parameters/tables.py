@@ -32,6 +32,7 @@ __all__ = [
     "spine_table",
     "strength_table",
     "surface_table",
+    "wall_table",
 ]
 
 Source = Literal["paper", "measured", "calibrated", "assumed"]
@@ -359,6 +360,11 @@ def spine_table() -> ParameterTable:
 def strength_table() -> ParameterTable:
     """Return how the strengths of tiles scatter, from ``strength.toml``."""
     return bundled_table("strength.toml")
+
+
+def wall_table() -> ParameterTable:
+    """Return the numbers of generated walls, by their names, from ``walls.toml``."""
+    return bundled_table("walls.toml")
 
 
 def draw_table() -> ParameterTable:

@@ -1,4 +1,10 @@
 from .filled_holes import FilledCells as FilledCells, filled_cells as filled_cells
+from .generated import (
+    RockSource as RockSource,
+    generate_wall as generate_wall,
+    read_rock as read_rock,
+    wall_names as wall_names,
+)
 from .holds import (
     Cylinder as Cylinder,
     Edge as Edge,

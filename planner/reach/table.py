@@ -45,6 +45,53 @@ class ReachTable:
     starts: Indices
     angles: Array
 
+    @classmethod
+    def of(cls, counts: Indices, spanned: NDArray[np.bool_], angles: Sequence[Array]) -> ReachTable:
+        """Return the table of solutions that are given limb by limb.
+
+        Parameters
+        ----------
+        counts : ndarray of int, shape (P, B, L)
+            Number of solutions for each placement, body and limb.
+        spanned : ndarray of bool, shape (P, B, L)
+        angles : sequence of ndarray, length L
+            Solutions (A, n) of each limb, by placement, then by body [rad].
+        """
+        flat = np.moveaxis(counts, 2, 0)
+        entry = np.full(flat.shape, -1, dtype=np.intp)
+        entry[flat > 0] = np.arange(int((flat > 0).sum()))
+        most = max(each.shape[1] for each in angles)
+        return cls(
+            entry=np.ascontiguousarray(np.moveaxis(entry, 0, 2)),
+            spanned=spanned,
+            starts=np.cumsum(np.append(0, flat[flat > 0])),
+            angles=np.concatenate([np.pad(a, ((0, 0), (0, most - a.shape[1]))) for a in angles]),
+        )
+
+    @classmethod
+    def joined(cls, tables: Sequence[ReachTable]) -> ReachTable:
+        """Return the table of all placements of several tables, of the same bodies and limbs."""
+        counts = np.concatenate([each.counts for each in tables])
+        spanned = np.concatenate([each.spanned for each in tables])
+        angles = [
+            np.concatenate([each._of_limb(limb) for each in tables])
+            for limb in range(counts.shape[2])
+        ]
+        return cls.of(counts, spanned, angles)
+
+    @property
+    def counts(self) -> Indices:
+        """Number of solutions of each placement, body and limb, shape (P, B, L)."""
+        found = np.zeros(self.entry.shape, dtype=np.intp)
+        found[self.reached] = np.diff(self.starts)[self.entry[self.reached]]
+        return found
+
+    def _of_limb(self, limb: int) -> Array:
+        """Return all solutions of one limb, by placement, then by body."""
+        first = int((self.entry[:, :, :limb] >= 0).sum())
+        end = first + int((self.entry[:, :, limb] >= 0).sum())
+        return self.angles[self.starts[first] : self.starts[end]]
+
     @property
     def reached(self) -> NDArray[np.bool_]:
         """True where a limb reaches a placement from a body, shape (P, B, L)."""
@@ -179,27 +226,18 @@ def reach_table(
     targets = _poses_in_bodies(placements, bodies)
     shape = len(placements), len(bodies), len(names)
     counts, spanned = np.zeros(shape, dtype=np.intp), np.zeros(shape, dtype=bool)
-    found, most = list[Array](), max(len(robot.chains[limb].joints) for limb in names)
+    found = list[Array]()
     scene = CollisionScene(robot, ())
     for i, limb in enumerate(names):
         chain, starts = _limb_postures(robot, limb)
         fits = _clear_of_itself(scene, limb) if clear else None
         angles, count = reach_poses(chain, starts, targets, branches, fits)
-        found.append(np.pad(angles, ((0, 0), (0, most - angles.shape[1]))))
+        found.append(angles)
         counts[:, :, i] = count.reshape(shape[:2])
         spanned[:, :, i] = (chain.spans(targets) <= 1.0 + REACH_SETTINGS.pose_error).reshape(
             shape[:2]
         )
-    # entries limb by limb, then by placement and body
-    flat = np.moveaxis(counts, 2, 0)
-    entry = np.full(flat.shape, -1, dtype=np.intp)
-    entry[flat > 0] = np.arange(int((flat > 0).sum()))
-    return ReachTable(
-        entry=np.ascontiguousarray(np.moveaxis(entry, 0, 2)),
-        spanned=spanned,
-        starts=np.cumsum(np.append(0, flat[flat > 0])),
-        angles=np.concatenate(found),
-    )
+    return ReachTable.of(counts, spanned, found)
 
 
 @stored("starts of limbs", 32)

@@ -209,7 +209,7 @@ def load_factor_ends(
     return found
 
 
-@compiled("f2", "f2", "f1", "f3", "i1", "i1", "f0", "i0", "i0")
+@compiled("f2", "f2", "f1", "f3", "i1", "i1", "f0", "f0", "i0", "i0")
 def passing(
     directions: Array,
     supports: Array,
@@ -218,12 +218,15 @@ def passing(
     candidates: Indices,
     starts: Indices,
     factor: float,
+    slack: float,
     first: int,
     most: int,
 ) -> tuple[Indices, int]:
     """Return the choices of one placement for each limb that no direction rules out.
 
-    Choices of the first limbs are ruled out together where the best of the others cannot help.
+    A direction rules a choice out if it does so at the factor and at a bound of all load factors:
+    then it does at every multiple in between. Choices of the first limbs are ruled out together
+    where the best of the others cannot help.
 
     Parameters
     ----------
@@ -238,7 +241,9 @@ def passing(
     starts : ndarray of int, shape (H + 1,)
         Index of each limb's first candidate.
     factor : float
-        Multiple of the body wrench.
+        Least load factor.
+    slack : float
+        Relative tolerance of a load factor.
     first, most : int
         Choices that the first buffer holds, and that may pass.
 
@@ -249,30 +254,43 @@ def passing(
         M; or ``most`` + 1 if there are more, of which some are left out.
     """
     limbs, ways = len(starts) - 1, len(directions)
-    # spare of each candidate in each direction; a choice passes if no sum is below what is needed
-    spare = np.empty((len(candidates), ways))
+    # what each candidate adds in each direction: to the supports, and to the body wrench
+    held, needed = np.empty((len(candidates), ways)), np.zeros((len(candidates), ways))
     for limb in range(limbs):
         for i in range(starts[limb], starts[limb + 1]):
             p = candidates[i]
             for d in range(ways):
-                spare[i, d] = supports[p, d]
+                held[i, d] = supports[p, d]
                 if len(moments) > 0:
                     for x in range(3):
-                        spare[i, d] -= factor * directions[d, 3 + x] * moments[limb, p, x]
-    # the least that the sum of the limbs up to one must have in each direction
-    least = np.empty((limbs + 1, ways))
+                        needed[i, d] += directions[d, 3 + x] * moments[limb, p, x]
+    # the largest load factor of all choices is at most 1 / share
+    share, body = 0.0, np.zeros(ways)
     for d in range(ways):
-        need = 0.0
         for x in range(6):
-            need += factor * directions[d, x] * wrench[x]
-        least[limbs, d] = need
-        for limb in range(limbs - 1, -1, -1):
-            best = -np.inf
-            for i in range(starts[limb], starts[limb + 1]):
-                best = max(best, spare[i, d])
-            least[limb, d] = least[limb + 1, d] - best
+            body[d] += directions[d, x] * wrench[x]
+        most_held, least_needed = 0.0, body[d]
+        for limb in range(limbs):
+            most_held += held[starts[limb] : starts[limb + 1], d].max()
+            least_needed += needed[starts[limb] : starts[limb + 1], d].min()
+        if least_needed > 0.0:
+            share = max(share, least_needed / max(most_held, 1e-9 * least_needed))
+    share *= 1.0 - slack
+    if factor > 0.0:
+        share = min(share, 1.0 / factor)
+    factor *= 1.0 - slack
+    # spare of each candidate at both ends of the multiples, and the least that the sum of the limbs
+    # up to one must have
+    spare, far = held - factor * needed, share * held - needed
+    least, far_least = np.empty((limbs + 1, ways)), np.empty((limbs + 1, ways))
+    least[limbs], far_least[limbs] = factor * body, body
+    for limb in range(limbs - 1, -1, -1):
+        for d in range(ways):
+            own = slice(starts[limb], starts[limb + 1])
+            least[limb, d] = least[limb + 1, d] - spare[own, d].max()
+            far_least[limb, d] = far_least[limb + 1, d] - far[own, d].max()
     chosen, passed = np.empty((first, limbs), dtype=np.intp), 0
-    sums = np.zeros((limbs + 1, ways))
+    sums, far_sums = np.zeros((limbs + 1, ways)), np.zeros((limbs + 1, ways))
     at, killer = starts[:-1].copy(), np.zeros(limbs, dtype=np.intp)
     level = 0
     while level >= 0:
@@ -282,17 +300,24 @@ def passing(
                 at[level] += 1
             continue
         i, below, last = at[level], level + 1, killer[level]
-        held = sums[level, last] + spare[i, last] >= least[below, last]
-        if held:
+        passes = (
+            sums[level, last] + spare[i, last] >= least[below, last]
+            or far_sums[level, last] + far[i, last] >= far_least[below, last]
+        )
+        if passes:
             for d in range(ways):
-                if sums[level, d] + spare[i, d] < least[below, d]:
-                    held, killer[level] = False, d
+                if (
+                    sums[level, d] + spare[i, d] < least[below, d]
+                    and far_sums[level, d] + far[i, d] < far_least[below, d]
+                ):
+                    passes, killer[level] = False, d
                     break
-        if not held:
+        if not passes:
             at[level] += 1
         elif below < limbs:
             for d in range(ways):
                 sums[below, d] = sums[level, d] + spare[i, d]
+                far_sums[below, d] = far_sums[level, d] + far[i, d]
             level = below
             at[level] = starts[level]
         else:

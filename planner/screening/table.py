@@ -178,7 +178,7 @@ class ScreeningTable:
         limbs: Sequence[int] | None = None,
         most: int = SCREENING_SETTINGS.most_passing,
     ) -> Indices:
-        """Return the stances of a body that may hold a multiple of the body wrench.
+        """Return the stances of a body that may have a load factor of at least a given one.
 
         All choices of one placement for each of H limbs are screened.
 
@@ -190,8 +190,8 @@ class ScreeningTable:
             Placements of each limb; none may be at two limbs' disposal where no two hands may be
             at the same place, or choices with a placement twice are returned as well.
         factor : float
-            Multiple of the body wrench that is to be held: exactly this one, which a hand that
-            presses on its rock may not hold although it holds a larger one.
+            Least load factor. A stance that no direction rules out at all multiples from this one
+            on passes: hands that press on their rock may hold a larger one only.
         limbs : sequence of int, length H, optional
             Indices of the limbs among ``moments``; 0 to H − 1 by default.
         most : int
@@ -220,14 +220,15 @@ class ScreeningTable:
             np.ascontiguousarray(weighed),
             np.concatenate(candidates).astype(np.intp),
             np.cumsum([0, *map(len, candidates)]),
-            float(factor) * (1.0 - SCREENING_SETTINGS.slack),
+            float(factor),
+            SCREENING_SETTINGS.slack,
             SCREENING_SETTINGS.first_buffer,
             most,
         )
         if count > most:
             raise LimitError(
-                f"more than {most} stances pass at {factor:g} times the body wrench; learn more "
-                "directions, or ask for a larger multiple"
+                f"more than {most} stances pass at a load factor of {factor:g}; learn more "
+                "directions, or ask for a larger one"
             )
         return found
 

@@ -48,6 +48,10 @@ COMMANDS_BY_NAME: Final = {
         "spaces",
         "Show what the body can bear: which wrenches, and which accelerations.",
     ),
+    "check": Entry(
+        "check",
+        "Recompute what the certificate of a climb claims, without the search.",
+    ),
     "demo": Entry(
         "network",
         "Start the service, ask it for a plan of a real stance, and draw the answer.",

@@ -147,13 +147,16 @@ def holds_command(
 ) -> None:
     """Propose holds on ROCK, a mesh in metres (of a scan, `crux rock` makes one).
 
+    In place of a file, ROCK may be a generated wall: leaning-wall, blocked-wall or small-wall, each
+    also with a seed (leaning-wall:3).
+
     A hand is closed at every point of a grid, at several angles of its wrist; it approaches against
     the mean normal of the rock under its palm. Holds are sorted by the pull-off, with every other
     force and moment zero, that is held in nine of ten samples of where the hand comes to the rock.
     Each hold has a `place`, for the hand of a request whose rock this is.
     """
     from hand_models import fixed_wrist, parameters
-    from hand_models.rock import Mesh, read_mesh
+    from hand_models.rock import Mesh, read_rock
     from hand_models.tile import Surface
 
     samples = samples if robust else 0
@@ -166,7 +169,8 @@ def holds_command(
     Surface.named(surface)
     tables.write_alone(output)
     numbers = parameters.hand_table() if hand is None else parameters.own_hand(hand)
-    mesh = Mesh(*read_mesh(rock), numbers, anywhere=True)
+    source = read_rock(rock)
+    mesh = Mesh(source.vertices, source.faces, numbers, anywhere=True)
     radius = 0.5 * numbers.scalar("palm", "length")
     # some four hours of one core, forty times that with seat best or placing contact
     most = 100_000

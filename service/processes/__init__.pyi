@@ -6,3 +6,4 @@ from .interruption import (
 )
 from .many import Planners as Planners, plan_many as plan_many, worth as worth
 from .questions import Job as Job, answering as answering
+from .wall_making import make_wall as make_wall

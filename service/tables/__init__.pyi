@@ -2,6 +2,10 @@ from .body_spaces import (
     print_body_space as print_body_space,
     print_com_region as print_com_region,
 )
+from .certificates import (
+    certificate_json as certificate_json,
+    print_certificate as print_certificate,
+)
 from .command_line import VERBOSITY_KEY as VERBOSITY_KEY, ExitStatus as ExitStatus, note as note
 from .extras import (
     print_advice as print_advice,

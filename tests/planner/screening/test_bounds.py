@@ -136,9 +136,18 @@ def test_choices_that_pass_are_those_that_no_direction_rules_out(factor):
     every = np.array(list(product(*candidates)))
     stances = StanceIndices(np.ones(len(every), dtype=int), every)
     table = learn(tabled(wall, moments=moments), stances, count=20).table.reordered(stances, factor)
-    needs = factor * (1.0 - 1e-6) * table.needed(stances) @ table.directions.T
-    held = table.supports[every].sum(axis=1) >= needs
-    passing = every[held.all(axis=1)]
+    needs, held = table.needed(stances) @ table.directions.T, table.supports[every].sum(axis=1)
+    # no load factor is larger than this one, of the most that is held and the least that is needed
+    most = sum(table.supports[each].max(axis=0) for each in candidates)
+    least = table.directions @ table.wrenches[1] + sum(
+        (moments[1, limb, each] @ table.directions[:, 3:].T).min(axis=0)
+        for limb, each in enumerate(candidates)
+    )
+    end = (most[least > 0.0] / least[least > 0.0]).min()
+    ruled = (held < factor * (1.0 - 1e-6) * needs) & (held < end * (1.0 + 1e-6) * needs)
+    passing = every[~ruled.any(axis=1)]
+    bounds = table.bounds(stances)
+    assert {tuple(row) for row in every[bounds >= factor]} <= {tuple(row) for row in passing}
     found = table.passing(1, candidates, factor)
     assert {tuple(row) for row in found} == {tuple(row) for row in passing}
     assert len(found) == len(passing)
@@ -146,6 +155,22 @@ def test_choices_that_pass_are_those_that_no_direction_rules_out(factor):
         with pytest.raises(LimitError, match="learn more"):
             table.passing(1, candidates, factor, most=len(passing) - 1)
     assert len(table.passing(1, [candidates[0], candidates[1][:0]], factor)) == 0
+
+
+def test_choices_that_hold_larger_multiples_only_pass():
+    """Closed hands press on their rock: these hold 0.016 to 0.496 times the body wrench."""
+    wall, members = random_wall(5, 8, 0.8), np.array([4, 5, 6])
+    wrench = wall.wrench(COMS[0])
+    held, against = (solve_stance(wall.hands, members, each) for each in (wrench, -wrench))
+    table = ScreeningTable.of(wall.hands, wrench[None]).extended(
+        np.array([held.direction, against.direction])
+    )
+    low, high = table.ends(StanceIndices(np.zeros(1, dtype=int), members[None]))[0]
+    assert 0.0 < low < high == pytest.approx(held.factor, rel=1e-6)
+    candidates = list(members[:, None])
+    for factor in (0.0, 0.5 * low, 0.99 * high):
+        assert len(table.passing(0, candidates, factor)) == 1
+    assert len(table.passing(0, candidates, 1.01 * high)) == 0
 
 
 def test_do_not_depend_on_the_order_of_directions_or_stances():

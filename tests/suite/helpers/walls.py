@@ -9,7 +9,10 @@ import scipy
 from hand_models.base import Pose, wrench_transport
 from planner.prepare import prepare_stance
 from planner.programs import WRENCH_UNIT
-from planner.screening import HandParts, WorldHands
+from planner import search
+from planner.reach import ReachTable
+from planner.robots import robosimian
+from planner.screening import HandParts, ScreeningTable, WorldHands
 from service.answering import questions
 from service.commands import stances
 
@@ -71,3 +74,68 @@ def random_wall(seed, count, lean=0.6):
         Pose(back @ place, back @ into @ turn) for place, turn in zip(places, turns, strict=True)
     ]
     return Wall(spaces, poses, back)
+
+
+def climbing_wall(
+    seed,
+    count,
+    *,
+    columns=2,
+    rows=6,
+    stand_offs=(0.35,),
+    size=None,
+    step=0.15,
+    radius=0.45,
+    lean=0.6,
+    weighed=True,
+    palms=0.12,
+):
+    """A wall with so many hands, bodies on a grid, and a plain rule for what each limb reaches.
+
+    Each limb reaches hands in a circle beside its corner of the body; its weight is where its hand
+    is, in part. The world is turned by ``lean``.
+    """
+    rng = np.random.default_rng([seed, 1])
+    wall = random_wall(seed, count, lean)
+    width, height = size or (step * (columns - 1) + 1.1, step * (rows - 1) + 1.1)
+    flat = np.column_stack([rng.uniform(0.0, width, count), rng.uniform(0.0, height, count)])
+    flat -= [width / 2.0, 0.55]
+    poses = [
+        Pose(wall.lean @ np.array([0.0, *place]), pose.rotation)
+        for place, pose in zip(flat, wall.poses, strict=True)
+    ]
+    wall = Wall(wall.spaces, poses, wall.lean)
+    grid = np.array(
+        [
+            [-off, step * (i - (columns - 1) / 2.0), step * j]
+            for j in range(rows)
+            for i in range(columns)
+            for off in stand_offs
+        ]
+    )
+    corners = 0.42 * np.array([[-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [1.0, 1.0]])
+    away = flat[:, None, None] - (grid[:, None, 1:] + corners)
+    reached = np.linalg.norm(away, axis=-1) < radius
+    entry = np.full(reached.shape, -1)
+    entry[reached] = np.arange(reached.sum())
+    reach = ReachTable(
+        entry, reached, np.arange(reached.sum() + 1), np.zeros((int(reached.sum()), 7))
+    )
+    wrenches = np.array([wall.wrench(place) for place in grid])
+    moments = np.zeros((0, 0, 0, 0))
+    if weighed:
+        shifted = np.moveaxis(np.concatenate([np.zeros((*away.shape[:3], 1)), away], axis=-1), 0, 2)
+        force = np.array([0.0, 0.0, 9.81 * 6.0])
+        moments = np.cross(0.5 * shifted @ wall.lean.T, force) / WRENCH_UNIT[3:]
+        moments *= np.moveaxis(reached, 0, 2)[..., None]
+    near = np.abs(grid[:, None] - grid[None]).max(axis=2) < 1.2 * step
+    near &= (np.abs(grid[:, None] - grid[None]) > 1e-6).sum(axis=2) == 1
+    return search.Wall(
+        robot=robosimian(),
+        places=(),
+        bodies=tuple(Pose(wall.lean @ place, wall.lean) for place in grid),
+        shifts=np.argwhere(np.triu(near)),
+        reach=reach,
+        screening=ScreeningTable.of(wall.hands, wrenches, moments),
+        apart=np.linalg.norm(flat[:, None] - flat[None], axis=2) > palms,
+    ), wall

@@ -1,0 +1,402 @@
+"""Decide whether a climb has a given least load factor: the lifts around both ends, until they meet.
+
+From the start and from the goal, lifts are reached over four-hand stances that no direction rules
+out. A lift is passed only if its linear program says that it holds enough. Where lifts of both ends
+meet, the stances on the way between them are solved; what fails is taken out, and what hung on it
+is joined anew. If one end has no lift left, no climb has this least load factor.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator
+from itertools import combinations, count
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hand_models.base import Indices
+from planner.search.lifts import Lifts
+from planner.search.programs import Programs
+from planner.search.settings import SEARCH_SETTINGS
+from planner.search.wall import State
+
+__all__ = ["Blocked", "Decision"]
+
+Blocked = frozenset[tuple[State, State]]
+"""Moves that may not be made: a state and a later one; a state twice may not be passed at all."""
+
+
+Bodies = NDArray[np.bool_]
+
+
+class Way(NamedTuple):
+    """What joins two lifts, or a lift and an end, in the order of the climb.
+
+    Attributes
+    ----------
+    before, after : int
+        Lifts; −1 for the start, −2 for the goal.
+    place : int
+        Placement with which the lift that is not an end has all hands on the rock.
+    """
+
+    before: int
+    after: int
+    place: int
+
+
+class Decision:
+    """Search for a climb whose states all have a least load factor.
+
+    Parameters
+    ----------
+    lifts : Lifts
+        All lifts that may have it.
+    programs : Programs
+    blocked : frozenset of pairs of State
+    """
+
+    def __init__(self, lifts: Lifts, programs: Programs, blocked: Blocked) -> None:
+        self._lifts, self._nodes, self._programs = lifts, lifts.nodes, programs
+        self._least = lifts.multiple * (1.0 - 0.1 * SEARCH_SETTINGS.exact)
+        self._factors = np.full(len(lifts), np.nan)
+        self._blocked = blocked
+        self._stopped = {first for first, second in blocked if first == second}
+        self._barred = set[Way]()
+        self._bad = set[State]()
+        self._turn = count()
+        self._queues = [list[tuple[float, int, Indices]](), list[tuple[float, int, Indices]]()]
+        self.hindered = False
+        self.route = self._shift_alone()
+        self.exhausted = 0
+        self._parents = [self._nodes["out"], self._nodes["parent_1"], self._nodes["parent_2"]]
+        self._vias = [self._nodes["out"], self._nodes["via_1"], self._nodes["via_2"]]
+        self._between = dict[Way, list[State]]()
+        self._recall()
+        for side in (1, 2):
+            seeds = lifts.beside(side - 1)
+            seeds = seeds[self._nodes["out"][seeds] == 0]
+            self._claim(side, seeds, -side, -1)
+            self._push(side, seeds)
+
+    @property
+    def multiple(self) -> float:
+        """The least load factor that is asked for."""
+        return self._lifts.multiple
+
+    @property
+    def ended(self) -> bool:
+        """Whether it is decided: a route was found, or an end has no lift left."""
+        return bool(self.route) or self.exhausted > 0
+
+    def _recall(self) -> None:
+        """Take over what was solved before."""
+        known, lifts = self._programs.known, self._lifts
+        count, bodies, limbs = lifts.ground.reached.shape
+        three = (known.members < 0).sum(axis=1) == 1
+        key = (known.members < 0).argmax(axis=1)
+        for limb in range(limbs - 1):
+            at = limb + (limb >= (known.members < 0).argmax(axis=1))
+            key = key * count + known.members[np.arange(len(key)), at]
+        own = np.flatnonzero(three & np.isin(key, lifts.keys))
+        triples = np.searchsorted(lifts.keys, key[own])
+        bounding = known.factors[own] < self._least
+        mine = own[bounding]
+        lifts.rule_out(triples[bounding], known.directions[mine], known.held[mine])
+        whole = lifts.keys[lifts.triples] * bodies + lifts.bodies
+        asked = key[own] * bodies + known.bodies[own]
+        at = np.minimum(np.searchsorted(whole, asked), max(len(whole) - 1, 0))
+        if len(whole):
+            fits = whole[at] == asked
+            self._factors[at[fits]] = known.factors[own[fits]]
+            self._nodes["out"][at[fits & bounding]] = 1
+
+    def _claim(self, side: int, lifts: Indices, parent: int, via: int) -> None:
+        self._nodes["claimed"][lifts] |= side
+        self._parents[side][lifts], self._vias[side][lifts] = parent, via
+
+    def _push(self, side: int, lifts: Indices) -> None:
+        if len(lifts):
+            lag = np.round(self._lifts.lag(lifts, 2 - side))
+            order = np.argsort(lag, kind="stable")
+            cuts = np.flatnonzero(np.diff(lag[order])) + 1
+            for part in np.split(order, cuts):
+                entry = float(lag[part[0]]), -next(self._turn), lifts[part]
+                heapq.heappush(self._queues[side - 1], entry)
+
+    def _waiting(self, side: int) -> int:
+        return sum(len(lifts) for _, _, lifts in self._queues[side - 1])
+
+    def _pop(self, side: int) -> Indices:
+        """Return some of the lifts that look nearest to the other end."""
+        queue, found, left = self._queues[side - 1], list[Indices](), SEARCH_SETTINGS.at_once
+        while queue and left > 0:
+            lag, _, lifts = heapq.heappop(queue)
+            mine = self._nodes[lifts]
+            lifts = lifts[(mine["claimed"] & side > 0) & (mine["closed"] == 0) & (mine["out"] == 0)]
+            if len(lifts) > left:
+                heapq.heappush(queue, (lag, -next(self._turn), lifts[left:]))
+            found.append(lifts[:left])
+            left -= len(found[-1])
+        return np.unique(np.concatenate(found)) if found else np.zeros(0, dtype=np.intp)
+
+    def advance(self) -> None:
+        """Pass some lifts of the end that has fewer of them."""
+        side = 1 if self._waiting(1) <= self._waiting(2) else 2
+        chosen = self._pop(side)
+        if not len(chosen):
+            self.exhausted = side
+            return
+        self._solve(chosen)
+        chosen = chosen[self._nodes["out"][chosen] == 0]
+        loose = chosen[self._parents[side][chosen] == -side]
+        if len(loose):
+            # lifts that the end itself may lead to
+            _, met = self._lifts.expand(loose, 0)
+            met = met[met[:, 1] == -side]
+            lifts, first = np.unique(met[:, 0], return_index=True)
+            self._vias[side][lifts] = met[first, 2]
+            lost = np.setdiff1d(loose, lifts)
+            self._release(side, lost)
+            chosen = np.setdiff1d(chosen, lost)
+        self._nodes["closed"][chosen] = side
+        claimed, met = self._lifts.expand(chosen, side)
+        self._push(side, claimed)
+        for i, j, place in met.tolist():
+            if j != -side and self._meet(side, i, j, place):
+                return
+
+    def _solve(self, chosen: Indices) -> None:
+        """Solve the programs of lifts, and rule out those that hold too little."""
+        lifts = self._lifts
+        new = chosen[np.isnan(self._factors[chosen])]
+        # one of each triple first: its direction may rule out the others
+        while len(new):
+            _, first = np.unique(lifts.triples[new], return_index=True)
+            some = new[first]
+            found = self._programs.solve(lifts.bodies[some], lifts.members[lifts.triples[some]])
+            self._factors[some] = found.factors
+            low = found.factors < self._least
+            self._nodes["out"][some[low]] = 1
+            lifts.rule_out(lifts.triples[some[low]], found.directions[low], found.held[low])
+            new = np.setdiff1d(new, some)
+            new = new[self._nodes["out"][new] == 0]
+
+    def _release(self, side: int, lost: Indices) -> None:
+        """Take lifts from an end; they may be reached from closed lifts that they are joined with."""
+        if not len(lost):
+            return
+        nodes = self._nodes
+        passed = lost[nodes["closed"][lost] == side]
+        nodes["claimed"][lost] &= ~side
+        nodes["claimed"][passed] = 0
+        nodes["closed"][passed] = 0
+        for part in np.array_split(lost, max(1, len(lost) // SEARCH_SETTINGS.at_once)):
+            _, met = self._lifts.expand(part, 0)
+            own, to = met[:, 0], met[:, 1]
+            owners = np.where(to < 0, -to, nodes["closed"][to])
+            met = met[(nodes["closed"][own] == 0) & (nodes["claimed"][own] & owners == 0)]
+            for i, j, place in met.tolist():
+                owner = -j if j < 0 else int(nodes["closed"][j])
+                if not nodes["claimed"][i] & owner and self._free(owner, j, i, place):
+                    self._claim(owner, np.array([i]), j, place)
+                    self._push(owner, np.array([i]))
+
+    # ways
+
+    def _way(self, side: int, parent: int, lift: int, place: int) -> Way:
+        if side == 1:
+            return Way(parent, lift, place)
+        return Way(lift, parent, place)
+
+    def _free(self, side: int, parent: int, lift: int, place: int) -> bool:
+        """Whether something may join a lift with its parent, as far as is known."""
+        way = self._way(side, parent, lift, place)
+        return way not in self._barred and bool(self._shift(self._stance(way), *self._span(way)))
+
+    def _stance(self, way: Way) -> tuple[int, ...]:
+        lift = way.before if way.before >= 0 else way.after
+        if way.before >= 0 and way.after >= 0 and self._lifts.triples[way.before] != (
+            self._lifts.triples[way.after]
+        ):
+            pair = self._lifts.members[self._lifts.triples[[way.before, way.after]]]
+            return tuple(pair.max(axis=0).tolist())
+        row = self._lifts.members[self._lifts.triples[lift]]
+        return tuple(np.where(row < 0, way.place, row).tolist())
+
+    def _span(self, way: Way) -> tuple[Bodies, Bodies]:
+        """Return where the body may be before and after the shift between two lifts, (B,) each."""
+        ends, count = self._lifts.ground.ends, len(self._lifts.ground.wall.bodies)
+        before, after = (
+            ends[-1 - lift].bodies if lift < 0 else np.arange(count) == self._lifts.bodies[lift]
+            for lift in (way.before, way.after)
+        )
+        return before, after
+
+    def _shift(self, members: tuple[int, ...], starts: Bodies, goals: Bodies) -> list[int]:
+        """Return the bodies of the shortest shift on four hands, past stances that fail."""
+        ground = self._lifts.ground
+        allowed = np.ones(len(ground.wall.bodies), dtype=bool)
+        for limb, p in enumerate(members):
+            allowed &= ground.reached[p, :, limb]
+        for body in np.flatnonzero(allowed).tolist():
+            state = State(body, members)
+            if state in self._bad or state in self._stopped:
+                allowed[body] = False
+        back = dict[int, int]()
+        front = np.flatnonzero(starts & allowed).tolist()
+        seen = starts & allowed
+        for body in front:
+            back[body] = -1
+        while front:
+            ahead = list[int]()
+            for body in front:
+                if goals[body]:
+                    path = [body]
+                    while back[path[-1]] >= 0:
+                        path.append(back[path[-1]])
+                    return path[::-1]
+                for other in np.flatnonzero(ground.beside[body] & allowed & ~seen).tolist():
+                    if (State(body, members), State(other, members)) in self._blocked:
+                        continue
+                    seen[other] = True
+                    back[other] = body
+                    ahead.append(other)
+            front = ahead
+        return []
+
+    def _states(self, way: Way) -> list[State]:
+        """Return the four-hand states between two lifts, all of which hold enough; [] if none."""
+        if way not in self._between:
+            self._between[way] = self._held(self._stance(way), *self._span(way))
+        return self._between[way]
+
+    def _held(self, members: tuple[int, ...], starts: Bodies, goals: Bodies) -> list[State]:
+        """Return the states of the shortest shift that hold enough; [] if none do."""
+        while True:
+            states = [State(body, members) for body in self._shift(members, starts, goals)]
+            low = [each for each in states if self._programs.stance(each) < self._least]
+            if not low:
+                return states
+            self._bad.update(low)
+
+    def _shift_alone(self) -> tuple[State, ...]:
+        """Return a climb that only shifts the body, if there is one."""
+        ground, table = self._lifts.ground, self._lifts.table
+        starts, goals = (np.asarray(end.bodies, dtype=bool) for end in ground.ends)
+        both = ground.reached[:, goals].any(axis=1)
+        for body in np.flatnonzero(starts).tolist():
+            own = list[Indices]()
+            for limb, column in enumerate(both.T):
+                fits = ground.of(body, limb)[column[ground.of(body, limb)]]
+                for fixed in ground.fixed[:, limb]:
+                    fits = fits[(fixed < 0) | (fits == fixed)]
+                own.append(fits)
+            rows = table.passing(body, own, self.multiple)
+            for i, j in combinations(range(len(own)), 2):
+                rows = rows[ground.wall.apart[rows[:, i], rows[:, j]]]
+            only = np.arange(len(starts)) == body
+            for members in map(tuple, rows.tolist()):
+                if states := self._held(members, only, goals):
+                    return tuple(states)
+        return ()
+
+    def _state(self, lift: int) -> State:
+        row = self._lifts.members[self._lifts.triples[lift]]
+        return State(int(self._lifts.bodies[lift]), tuple(row.tolist()))
+
+    # where both ends meet
+
+    def _meet(self, side: int, i: int, j: int, place: int) -> bool:
+        """Try the climb over a lift that one end has passed, and one that the other has."""
+        nodes = self._nodes
+        while True:
+            if nodes["closed"][i] != side or (j >= 0 and nodes["closed"][j] != 3 - side):
+                return False
+            middle = Way(i, j, place) if side == 1 else Way(j, i, place)
+            if middle in self._barred:
+                return False
+            first, last = (i, j) if side == 1 else (j, i)
+            ways = [*reversed(list(self._chain(1, first))), middle, *self._chain(2, last)]
+            failed = self._try(ways) if self._states(middle) else middle
+            if failed is None:
+                return True
+            if failed is middle:
+                return False
+            # the lift that hung on it
+            mine = 1 if ways.index(failed) < ways.index(middle) else 2
+            self._detach(mine, failed.after if mine == 1 else failed.before)
+
+    def _chain(self, side: int, lift: int) -> Iterator[Way]:
+        """Return the ways from a lift back to its end; none from the end itself."""
+        while lift >= 0:
+            parent = int(self._parents[side][lift])
+            yield self._way(side, parent, lift, int(self._vias[side][lift]))
+            lift = parent
+
+    def _try(self, ways: list[Way]) -> Way | None:
+        """Return the first way that fails; None, and the climb is kept, if all hold."""
+        states = list[State]()
+        for way in ways:
+            between = self._states(way) if way not in self._barred else []
+            if not between:
+                return way
+            if way.before >= 0:
+                lift = self._state(way.before)
+                turns = [(lift, between[0]), (states[-2], lift), (states[-2], between[0])]
+                if lift in self._stopped or any(turn in self._blocked for turn in turns):
+                    self._bar(way)
+                    return way
+            states += between
+            if way.after >= 0:
+                after = self._state(way.after)
+                if (between[-1], after) in self._blocked:
+                    self._bar(way)
+                    return way
+                states.append(after)
+        self.route = tuple(states)
+        return None
+
+    def _bar(self, way: Way) -> None:
+        self._barred.add(way)
+        self.hindered = True
+
+    def _detach(self, side: int, lift: int) -> None:
+        """Join what hangs on a lift with its end in another way, or release it."""
+        nodes = self._nodes
+        hangs = np.zeros(len(nodes), dtype=bool)
+        hangs[lift] = True
+        closed_by = nodes["closed"]
+        mine = np.flatnonzero(
+            (nodes["claimed"] & side > 0)
+            & ((closed_by == side) | (closed_by == 0))
+            & (self._parents[side] >= 0)
+        )
+        parents = self._parents[side][mine]
+        while True:
+            more = mine[hangs[parents] & ~hangs[mine]]
+            if not len(more):
+                break
+            hangs[more] = True
+        branch = np.flatnonzero(hangs)
+        passed = branch[closed_by[branch] == side]
+        for part in np.array_split(passed, max(1, len(passed) // SEARCH_SETTINGS.at_once)):
+            _, met = self._lifts.expand(part, 0)
+            to = met[:, 1]
+            outside = (to == -side) | ((to >= 0) & (closed_by[to] == side) & ~hangs[to])
+            for i, j, place in met[outside].tolist():
+                if not self._free(side, j, i, place):
+                    continue
+                if not self._states(self._way(side, j, i, place)):
+                    continue
+                parent, via = j, place
+                while True:
+                    before, way = int(self._parents[side][i]), int(self._vias[side][i])
+                    self._parents[side][i], self._vias[side][i] = parent, via
+                    if i == lift:
+                        return
+                    parent, via, i = i, way, before
+        self._release(side, branch)
+

@@ -1,0 +1,308 @@
+"""All lifts of a wall that may have a load factor, as the nodes of a graph.
+
+A lift is a body, a limb in the air and placements of the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hand_models.base import Array, Indices, go_on
+from planner import deadline
+from planner.screening import ScreeningTable
+from planner.search.settings import SEARCH_SETTINGS
+from planner.search.wall import Ends, Wall
+
+__all__ = ["Ground", "Lifts"]
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """What a wall allows whatever the hands hold: reach, shifts, and the ends of climbs.
+
+    Attributes
+    ----------
+    wall : Wall
+    ends : tuple of Ends
+        Start and goal.
+    """
+
+    wall: Wall
+    ends: tuple[Ends, Ends]
+
+    @cached_property
+    def reached(self) -> NDArray[np.bool_]:
+        """True where a limb reaches a placement from a body, shape (P, B, L)."""
+        return self.wall.reach.reached
+
+    @cached_property
+    def beside(self) -> NDArray[np.bool_]:
+        """True where the body may be shifted from one pose to another, shape (B, B)."""
+        count = len(self.wall.bodies)
+        found = np.zeros((count, count), dtype=bool)
+        first, second = np.asarray(self.wall.shifts, dtype=np.intp).reshape(-1, 2).T
+        found[first, second] = found[second, first] = True
+        return found
+
+    @cached_property
+    def near(self) -> Indices:
+        """Masks of `beside`, shape (B, W)."""
+        return _masks(self.beside)
+
+    @cached_property
+    def reach(self) -> Indices:
+        """Masks of the bodies from which limbs reach placements, shape (P, L, W)."""
+        count, bodies, limbs = self.reached.shape
+        flat = np.moveaxis(self.reached, 1, 2).reshape(count * limbs, bodies)
+        return _masks(flat).reshape(count, limbs, -1)
+
+    @cached_property
+    def candidates(self) -> tuple[Indices, Indices]:
+        """Placements that each limb reaches from each body, and the first of each, (B L + 1,)."""
+        by_body = np.moveaxis(self.reached, 0, 2)
+        counts = by_body.sum(axis=2).ravel()
+        return np.nonzero(by_body)[2].copy(), np.cumsum(np.append(0, counts))
+
+    @cached_property
+    def end_masks(self) -> Indices:
+        """Masks of the bodies at the start and at the goal, shape (2, W)."""
+        return _masks(np.array([end.bodies for end in self.ends], dtype=bool))
+
+    @cached_property
+    def fixed(self) -> Indices:
+        """Placements of the limbs at the start and at the goal, −1 for any, shape (2, L)."""
+        limbs = self.reached.shape[2]
+        rows = [[-1] * limbs if end.members is None else end.members for end in self.ends]
+        return np.array(rows, dtype=np.intp)
+
+    @cached_property
+    def hops(self) -> Array:
+        """Shifts from each body to the nearest of the start and of the goal, shape (2, B)."""
+        count = len(self.wall.bodies)
+        found = np.full((2, count), float(count))
+        for distance, end in zip(found, self.ends, strict=True):
+            at, hop = np.asarray(end.bodies, dtype=bool).copy(), 0
+            while at.any():
+                distance[at] = hop
+                at = self.beside[at].any(axis=0) & (distance == count)
+                hop += 1
+        return found
+
+    @cached_property
+    def far(self) -> Array:
+        """Mean of the `hops` of the bodies from which limbs reach placements, (2, P, L)."""
+        count = np.maximum(self.reached.sum(axis=1), 1)
+        return np.einsum("pbl,eb->epl", self.reached.astype(float), self.hops) / count
+
+    def of(self, body: int, limb: int) -> Indices:
+        """Return the placements that a limb reaches from a body."""
+        placements, first = self.candidates
+        at = body * self.reached.shape[2] + limb
+        return placements[first[at] : first[at + 1]]
+
+    def tops(self, table: ScreeningTable) -> Array:
+        """Return upper bounds of all load factors at each body, shape (B,)."""
+        found = np.empty(len(self.wall.bodies))
+        for body in range(len(found)):
+            held = np.zeros(len(table.directions))
+            needed = table.directions @ table.wrenches[body]
+            for limb in range(self.reached.shape[2]):
+                own = self.of(body, limb)
+                held += np.max(table.supports[own], axis=0, initial=0.0)
+                if len(table.moments) and len(own):
+                    turned = table.moments[body, limb, own] @ table.directions[:, 3:].T
+                    needed += np.minimum(turned.min(axis=0), 0.0)
+            counts = needed > SEARCH_SETTINGS.exact
+            found[body] = np.min(held[counts] / needed[counts], initial=1e9)
+        return found * (1.0 + 1e3 * SEARCH_SETTINGS.exact)
+
+
+@dataclass(frozen=True, eq=False)
+class Lifts:
+    """Lifts that no direction of a table rules out at a multiple, sorted by triple and body.
+
+    Attributes
+    ----------
+    ground : Ground
+    table : ScreeningTable
+    multiple : float
+        Least load factor.
+    tops : ndarray, shape (B,)
+        Upper bounds of all load factors at each body.
+    bodies, triples : ndarray of int, shape (n,)
+        Body of each lift, and its placements, an index of ``members``.
+    members : ndarray of int, shape (T, L)
+        Placements of each triple, −1 for the limb in the air.
+    starts : ndarray of int, shape (T + 1,)
+        First lift of each triple.
+    keys : ndarray of int, shape (T,)
+        Number of each triple, ascending.
+    nodes : ndarray of records, shape (n,)
+        State of each lift in a search.
+    """
+
+    ground: Ground
+    table: ScreeningTable
+    multiple: float
+    tops: Array
+    bodies: Indices
+    triples: Indices
+    members: Indices
+    starts: Indices
+    keys: Indices
+    nodes: NDArray[np.void]
+
+    @classmethod
+    def passing(cls, ground: Ground, table: ScreeningTable, multiple: float) -> Self:
+        """Return all lifts of a wall that may have a load factor of at least a multiple.
+
+        Raises
+        ------
+        LimitError
+            If there are too many.
+        DeadlineError
+            If the deadline passes first.
+        """
+        from planner.search.compiled_graph import NODE
+
+        count, bodies, limbs = ground.reached.shape
+        found, left = list[Indices](), SEARCH_SETTINGS.most_lifts
+        for body in range(bodies):
+            deadline.check("the lifts were screened")
+            go_on()
+            for lifted in range(limbs):
+                others = [limb for limb in range(limbs) if limb != lifted]
+                own = [ground.of(body, limb) for limb in others]
+                rows = table.passing(body, own, multiple, others, left)
+                apart = np.ones(len(rows), dtype=bool)
+                for i in range(len(others)):
+                    for j in range(i):
+                        apart &= ground.wall.apart[rows[:, i], rows[:, j]]
+                rows = rows[apart]
+                left -= len(rows)
+                key = np.full(len(rows), lifted, dtype=np.intp)
+                for column in rows.T:
+                    key = key * count + column
+                found.append(key * bodies + body)
+        order = np.sort(np.concatenate(found))
+        keys, starts, triples = np.unique(order // bodies, return_index=True, return_inverse=True)
+        return cls(
+            ground=ground,
+            table=table,
+            multiple=multiple,
+            tops=ground.tops(table),
+            bodies=order % bodies,
+            triples=triples,
+            members=_unpacked(keys, count, limbs),
+            starts=np.append(starts, len(order)),
+            keys=keys,
+            nodes=np.zeros(len(order), dtype=NODE),
+        )
+
+    def __len__(self) -> int:
+        return len(self.bodies)
+
+    def rule_out(self, triples: Indices, directions: Array, held: Array) -> int:
+        """Rule out lifts of triples by directions and the sums of supports in them, one each."""
+        from planner.search.compiled_graph import rule_out
+
+        return rule_out(
+            self.nodes,
+            self.bodies,
+            self.starts,
+            np.ascontiguousarray(triples),
+            self.members,
+            np.ascontiguousarray(held),
+            np.ascontiguousarray(directions),
+            self.table.wrenches,
+            self.table.moments,
+            self.tops,
+            self.multiple * (1.0 - 0.1 * SEARCH_SETTINGS.exact),
+        )
+
+    def expand(self, chosen: Indices, side: int) -> tuple[Indices, Indices]:
+        """Look at the neighbours of lifts, as `compiled_graph.expand` describes."""
+        from planner.search.compiled_graph import expand
+
+        ground, few = self.ground, SEARCH_SETTINGS.stance_directions
+        placements, first = ground.candidates
+        return expand(
+            self.nodes,
+            self.bodies,
+            self.triples,
+            self.members,
+            self.starts,
+            *self._hashed,
+            ground.near,
+            ground.reach,
+            placements,
+            first,
+            np.ascontiguousarray(ground.wall.apart),
+            ground.end_masks,
+            ground.fixed,
+            self.table.directions[:few],
+            self._few_supports,
+            self.table.wrenches,
+            self.table.moments,
+            self.tops,
+            self.multiple * (1.0 - 0.1 * SEARCH_SETTINGS.exact),
+            np.ascontiguousarray(chosen),
+            side,
+        )
+
+    def beside(self, end: int) -> Indices:
+        """Return the lifts next to which an end of the climb may be: 0 the start, 1 the goal."""
+        from planner.search.compiled_graph import touching
+
+        ground = self.ground
+        fixed = ground.fixed[end]
+        touched = touching(
+            self.bodies, self.triples, self.members, ground.near, ground.reach,
+            ground.end_masks[end],
+        )  # fmt: skip
+        fits = (self.members < 0) | (fixed < 0) | (self.members == fixed)
+        found: Indices = np.flatnonzero(touched & fits.all(axis=1)[self.triples])
+        return found
+
+    def lag(self, lifts: Indices, end: int) -> Array:
+        """Return how far lifts are from an end of the climb, in shifts of the body."""
+        rows, ground = self.members[self.triples[lifts]], self.ground
+        far = np.zeros(len(lifts))
+        for limb, column in enumerate(rows.T):
+            far += np.where(column >= 0, ground.far[end, column, limb], 0.0)
+        return far + ground.hops[end, self.bodies[lifts]]
+
+    @cached_property
+    def _hashed(self) -> tuple[Indices, Indices]:
+        from planner.search.compiled_graph import hash_table
+
+        return hash_table(self.keys)
+
+    @cached_property
+    def _few_supports(self) -> Array:
+        return np.ascontiguousarray(self.table.supports[:, : SEARCH_SETTINGS.stance_directions])
+
+
+def _masks(table: NDArray[np.bool_]) -> Indices:
+    from planner.search.compiled_graph import bit_masks
+
+    return bit_masks(np.ascontiguousarray(table))
+
+
+def _unpacked(keys: Indices, count: int, limbs: int) -> Indices:
+    """Return the placements (T, L) of triples from their numbers."""
+    left, columns = keys, list[Indices]()
+    for _ in range(limbs - 1):
+        columns.append(left % count)
+        left = left // count
+    found = np.full((len(keys), limbs), -1, dtype=np.intp)
+    rows, three = np.arange(len(keys)), np.array(columns[::-1]).reshape(limbs - 1, -1)
+    for at in range(limbs - 1):
+        limb = at + (at >= left)
+        found[rows, limb] = three[at]
+    return found

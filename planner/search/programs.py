@@ -1,0 +1,111 @@
+"""Linear programs of lifts and stances: each solved once, with the direction that bounds it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hand_models.base import Array, Indices
+from planner.screening import ScreeningTable, StanceIndices, solve_stance
+from planner.search.settings import SEARCH_SETTINGS
+from planner.search.wall import State
+
+__all__ = ["Programs", "Solved"]
+
+
+class Solved(NamedTuple):
+    """Load factors of N stances, with the directions that bound them.
+
+    Attributes
+    ----------
+    bodies : ndarray of int, shape (N,)
+    members : ndarray of int, shape (N, L)
+    factors : ndarray, shape (N,)
+        −∞ where no multiple of the body wrench is held.
+    directions : ndarray, shape (N, 6)
+        Zero where the solver failed; the factor is infinite then, and bounds nothing.
+    held : ndarray, shape (N,)
+        Sums of the supports of the hands in these directions.
+    """
+
+    bodies: Indices
+    members: Indices
+    factors: Array
+    directions: Array
+    held: Array
+
+    def below(self, multiple: float) -> Solved:
+        """Return those with a smaller load factor."""
+        kept = self.factors < multiple
+        return Solved(*(column[kept] for column in self))
+
+
+class Programs:
+    """Linear programs of the states of a wall.
+
+    Parameters
+    ----------
+    table : ScreeningTable
+        Hands, body wrenches and moments.
+    """
+
+    def __init__(self, table: ScreeningTable) -> None:
+        self._table = table
+        self._parts = list[Solved]()
+        self._stances = dict[State, float]()
+        self.count = 0
+
+    def solve(self, bodies: Indices, members: Indices) -> Solved:
+        """Return the load factors of states, which are kept."""
+        from planner.search.compiled_programs import load_factors
+
+        hands, settings = self._table.hands, SEARCH_SETTINGS
+        wrenches = self._table.needed(StanceIndices(bodies, members))
+        factors, directions, held = load_factors(
+            hands.points,
+            hands.rows,
+            hands.parts,
+            hands.hands,
+            hands.base,
+            hands.room,
+            np.ascontiguousarray(members),
+            np.ascontiguousarray(wrenches),
+            settings.zero,
+            settings.pivots,
+        )
+        for i in np.flatnonzero(np.isnan(factors)).tolist():
+            answer = solve_stance(hands, members[i][members[i] >= 0], wrenches[i])
+            if answer.direction is None:
+                factors[i] = np.inf
+                continue
+            directions[i] = answer.direction
+            held[i] = hands.supports(answer.direction[None])[members[i][members[i] >= 0]].sum()
+            factors[i] = -np.inf if np.isnan(answer.factor) else answer.factor
+        self.count += len(bodies)
+        found = Solved(bodies, members, factors, directions, held)
+        self._parts.append(found)
+        return found
+
+    def stance(self, state: State) -> float:
+        """Return the load factor of one state."""
+        if state not in self._stances:
+            found = self.solve(np.array([state.body]), np.array([state.members]))
+            self._stances[state] = float(found.factors[0])
+        return self._stances[state]
+
+    @property
+    def known(self) -> Solved:
+        """All that was solved."""
+        if len(self._parts) != 1:
+            limbs = self._table.moments.shape[1] or 4
+            none = Solved(
+                np.zeros(0, dtype=np.intp),
+                np.zeros((0, limbs), dtype=np.intp),
+                np.zeros(0),
+                np.zeros((0, 6)),
+                np.zeros(0),
+            )
+            whole = [np.concatenate(columns) for columns in zip(*(self._parts or [none]), strict=True)]
+            self._parts = [Solved(*whole)]
+        return self._parts[0]

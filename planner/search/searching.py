@@ -1,0 +1,237 @@
+"""The search for the climb with the largest least load factor: at any time one, and a bound."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+
+from hand_models.base import InvalidInputError, LimitError, go_on
+from planner import deadline
+from planner.screening import StanceIndices, solve_stance
+from planner.search.deciding import Blocked, Decision
+from planner.search.found import Found, Proof
+from planner.search.learning import learnt, some_lifts
+from planner.search.lifts import Ground, Lifts
+from planner.search.programs import Programs
+from planner.search.settings import SEARCH_SETTINGS
+from planner.search.standing import standing_climb
+from planner.search.wall import Ends, State, Wall
+
+__all__ = ["SearchProgress", "search"]
+
+SearchProgress = Callable[[str, float, float, int], None]
+"""Gets what is done, the best climb's least load factor, the bound, and the programs so far."""
+
+
+def search(
+    wall: Wall,
+    start: Ends,
+    goal: Ends,
+    *,
+    within: float = 0.0,
+    at_least: float | None = None,
+    seconds: float | None = None,
+    blocked: Blocked = frozenset(),
+    progress: SearchProgress | None = None,
+) -> Found:
+    """Find the climb with the largest least load factor, and bound every other.
+
+    Parameters
+    ----------
+    wall : Wall
+    start, goal : Ends
+    within : float
+        Part of its least load factor by which another climb may be better when the search ends.
+    at_least : float, optional
+        Least load factor that is enough, and without which none counts; by default the best climb
+        is looked for.
+    seconds : float, optional
+        Time after which the search ends with what it has [s].
+    blocked : frozenset of pairs of State
+        Moves that may not be made, which the climb goes round: a state and the next, or the one
+        after it. A state twice may not be passed. The bound is that of the statics all the same.
+    progress : callable, optional
+        Called with a phase, the least load factor so far, the bound and the programs solved.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``within``, ``at_least`` or ``seconds`` is out of range.
+    LimitError
+        If too many lifts would have to be kept before any climb is found.
+    DeadlineError
+        If the deadline passes first.
+    """
+    for name, value in (("within", within), ("at_least", at_least), ("seconds", seconds)):
+        if value is not None and not 0.0 <= value < np.inf:
+            raise InvalidInputError(f"must be at least 0, got {value:g}", field=name)
+    search_of = _Search(wall, (start, goal), blocked, progress, seconds)
+    return search_of.found(within, at_least)
+
+
+class _Search:
+    """State of a search: what was found and proven so far."""
+
+    def __init__(
+        self,
+        wall: Wall,
+        ends: tuple[Ends, Ends],
+        blocked: Blocked,
+        progress: SearchProgress | None,
+        seconds: float | None,
+    ) -> None:
+        self._started = time.perf_counter()
+        self._end = np.inf if seconds is None else self._started + seconds
+        self._ground, self._blocked, self._progress = Ground(wall, ends), blocked, progress
+        self._table, self._programs = wall.screening, Programs(wall.screening)
+        self._states: tuple[State, ...] = ()
+        self._least, self._bound = -np.inf, np.inf
+        self._proof: Proof | None = None
+        self._lifts = self._relearnt = 0
+        self._open: Decision | None = None
+        self._ceiling = self._tried = np.inf
+
+    def found(self, within: float, at_least: float | None) -> Found:
+        """Run the search to its end, or till time is over."""
+        settings = SEARCH_SETTINGS
+        self._learn()
+        standing, states = standing_climb(self._ground, self._table, self._programs)
+        passed = {*pairwise(states), *((each, each) for each in states)}
+        passed.update(zip(states[:-2], states[2:], strict=True))
+        if standing >= (at_least or 0.0) and not passed & self._blocked:
+            self._states, self._least = states, standing
+        if at_least is not None:
+            self._ceiling = np.inf
+        while not self._late():
+            best = max(self._least, 0.0)
+            enough = at_least is not None and self._least >= at_least * (1.0 - settings.exact)
+            if enough or self._ceiling <= best * (1.0 + within) * (1.0 + 2.0 * settings.exact):
+                return self._answer(True)
+            decided = self._decide(self._next(at_least))
+            if decided.route:
+                self._states = decided.route
+                self._least = min(self._programs.stance(state) for state in decided.route)
+            elif decided.exhausted:
+                multiple = decided.multiple if decided.multiple > 0.0 else -np.inf
+                # below the least load factor that is asked for, nothing counts
+                self._ceiling = -np.inf if multiple == at_least else multiple
+                if not decided.hindered and standing < decided.multiple:
+                    self._prove(decided, multiple)
+        return self._answer(False)
+
+    def _next(self, at_least: float | None) -> float:
+        """Return the least load factor that is tried next."""
+        settings = SEARCH_SETTINGS
+        if at_least is not None:
+            return at_least
+        if not self._states:
+            below = self._tried < self._ceiling
+            multiple = min(settings.step * self._ceiling, self._tried)
+            multiple *= settings.first_step if below else 1.0
+            return multiple if multiple > settings.lowest else 0.0
+        if self._open is not None and self._least < self._open.multiple < self._ceiling:
+            return self._open.multiple
+        if self._ceiling < self._least * (1.0 + settings.ratchet):
+            return self._least * (1.0 + settings.exact)
+        return float(np.sqrt(self._least * self._ceiling))
+
+    def _late(self) -> bool:
+        deadline.check("the best climb was found")
+        go_on()
+        return time.perf_counter() >= self._end
+
+    def _report(self, phase: str) -> None:
+        if self._progress is not None:
+            self._progress(phase, self._least, self._bound, self._programs.count)
+
+    def _learn(self) -> None:
+        """Learn directions from lifts of the whole wall, then from those that these leave."""
+        settings = SEARCH_SETTINGS
+        self._report("directions")
+        lifts = some_lifts(self._ground, settings.samples, 0)
+        half = settings.directions // 2
+        self._table = learnt(self._table, self._programs, lifts, half)
+        bounds = self._table.bounds(lifts)
+        self._bound = self._ceiling = float(np.max(self._ground.tops(self._table), initial=0.0))
+        self._tried = float(np.max(bounds, initial=0.0))
+        some = lifts.of(np.arange(min(len(bounds), settings.examples)))
+        self._table = self._table.reordered(some, float(np.quantile(bounds, 0.99)))
+
+    def _decide(self, multiple: float) -> Decision:
+        """Decide whether a climb has a least load factor, or leave it open when time is over.
+
+        Before the first climb is known, it is also left open after some steps, for a lower one.
+        """
+        decision, steps = self._open, np.inf
+        if decision is None or decision.multiple != multiple:
+            self._report(f"lifts at {multiple:.3g}")
+            try:
+                lifts = Lifts.passing(self._ground, self._table, multiple)
+            except LimitError:
+                if decision is None:
+                    raise
+            else:
+                self._lifts = len(lifts)
+                decision = Decision(lifts, self._programs, self._blocked)
+                if not self._states and multiple > 0.0:
+                    steps = SEARCH_SETTINGS.first_steps
+        assert decision is not None
+        self._open, self._tried = decision, multiple
+        self._report(f"climbs at {multiple:.3g}")
+        while not decision.ended and steps > 0 and not self._late():
+            decision.advance()
+            steps -= 1
+        if decision.ended:
+            self._open = None
+        self._relearn(multiple)
+        return decision
+
+    def _relearn(self, multiple: float) -> None:
+        """Add those directions of lifts just solved that rule out most of them."""
+        settings, known = SEARCH_SETTINGS, self._programs.known
+        low = np.flatnonzero((known.factors < multiple) & known.directions.any(axis=1))
+        low = low[low >= self._relearnt]
+        self._relearnt = len(known.factors)
+        room = settings.directions - len(self._table.directions)
+        if room <= 0 or len(low) < settings.few:
+            return
+        rng = np.random.default_rng(0)
+        some = rng.choice(low, min(len(low), settings.examples), replace=False)
+        stances = StanceIndices(known.bodies[some], known.members[some])
+        of = known.directions[some[: settings.offered]]
+        offered = self._table.extended(of).latest(len(of)).reordered(stances, multiple)
+        self._table = self._table.extended(offered.directions[: min(room, settings.taken)])
+
+    def _prove(self, decided: Decision, multiple: float) -> None:
+        known = self._programs.known.below(decided.multiple)
+        bounding = known.directions.any(axis=1)
+        self._bound = multiple
+        self._proof = Proof(
+            multiple=decided.multiple,
+            directions=self._table.directions,
+            members=known.members[bounding],
+            own=known.directions[bounding],
+            backward=decided.exhausted == 2,
+        )
+
+    def _answer(self, finished: bool) -> Found:
+        """Return what was found, each state's program solved again by another solver."""
+        hands, factors = self._table.hands, list[float]()
+        for state in self._states:
+            members = np.array(state.members)
+            (wrench,) = self._table.needed(StanceIndices(np.array([state.body]), members[None]))
+            factors.append(solve_stance(hands, members[members >= 0], wrench).factor)
+        return Found(
+            states=self._states,
+            factors=np.array(factors),
+            least=min(factors, default=-np.inf),
+            bound=self._bound,
+            proof=self._proof,
+            programs=self._programs.count,
+            lifts=self._lifts,
+            seconds=time.perf_counter() - self._started,
+            finished=finished,
+        )

@@ -1,0 +1,5 @@
+"""Make what a climb is searched on: placements and bodies on a rock, and tables about them."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

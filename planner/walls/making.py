@@ -1,0 +1,336 @@
+"""Make a wall of a rock: questions and answers of its chunks, and the wall made of all answers.
+
+A chunk's answer depends on its question and the wall's source alone, whatever process gives it.
+"""
+
+from __future__ import annotations
+
+import io
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
+from typing import Any, Protocol
+
+import msgspec
+import numpy as np
+
+from hand_models.base import Array, InvalidInputError, Pose, UnsupportedError, errors_under, go_on
+from hand_models.fixed_wrist import HoldTrial, input_digests, wrench_space
+from hand_models.rock import Mesh
+from hand_models.tile import Surface
+from planner import deadline
+from planner.prepare import settle_each
+from planner.question import EARTH_GRAVITY, HandOnHold
+from planner.reach import ReachTable, reach_table
+from planner.robots import Robot
+from planner.screening import HandParts
+from planner.search import Wall
+from planner.walls.assembly import assemble_wall
+from planner.walls.bodies import BodyPoses, body_poses
+from planner.walls.files import robot_digest
+from planner.walls.grids import BodyGrid, PlaceGrid
+from planner.walls.places import HandPlace, best_places, hand_at, place_trials
+
+__all__ = ["Ask", "MadeWall", "WallProgress", "WallSource", "wall_of"]
+
+Ask = Callable[[Sequence[bytes]], Iterable[bytes | None]]
+"""Answers encoded questions of chunks in their order (`WallSource.answer`); None for a lost one."""
+
+
+class WallProgress(Protocol):
+    """Is called with the phase, ``placements`` or ``reach``, and how much of it is done."""
+
+    def __call__(self, phase: str, done: int, total: int, /) -> None: ...
+
+
+class Chunk(msgspec.Struct, omit_defaults=True):
+    """A question of a chunk: hands to try at points, or placements to reach.
+
+    Attributes
+    ----------
+    points : list of list of HoldTrial
+        Hands to try at each of some points.
+    poses : list of list of float
+        Rows of (3, 4) arrays: axes and origins in W of hand frames to reach [1, m].
+    """
+
+    points: list[list[HoldTrial]] = []
+    poses: list[list[float]] = []
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class WallSource:
+    """What a wall is made from; it can be pickled.
+
+    All limbs of a robot have the same hand, so any limb may take any placement.
+
+    Attributes
+    ----------
+    rock : Mesh
+    rock_pose : Pose
+        The rock's frame in the world frame W.
+    robot : Robot
+    surface : Surface
+        The rock's, the preset ``rock`` by default.
+    places : PlaceGrid
+    bodies : BodyGrid
+    gravity : ndarray, shape (3,)
+        Acceleration of gravity, in W [m/s²].
+    more_places : sequence of HandOnHold
+        Placements that are added at the end, such as those of a given stance.
+    more_bodies : sequence of Pose
+        Poses of B in W that are added at the end. They may be shifted to those of the grid that are
+        nearer than one and a half of its spacings, and turned by `BodyGrid.turn` at most.
+    together : int
+        Points at which hands are closed together, and placements that are reached together, in one
+        chunk.
+    """
+
+    rock: Mesh
+    rock_pose: Pose
+    robot: Robot
+    surface: Surface = field(default_factory=lambda: Surface.named("rock"))
+    places: PlaceGrid = field(default_factory=PlaceGrid)
+    bodies: BodyGrid = field(default_factory=BodyGrid)
+    gravity: Array = field(default_factory=lambda: np.array(EARTH_GRAVITY))
+    more_places: Sequence[HandOnHold] = ()
+    more_bodies: Sequence[Pose] = ()
+    together: int = 12
+
+    @property
+    def digest(self) -> str:
+        """Digest of all that the answers of chunks depend on, besides the questions."""
+        inputs = input_digests(self.rock, self.surface, self.robot.hand.table.sections)
+        arrays = [self.rock_pose.position, self.rock_pose.rotation, np.asarray(self.gravity)]
+        more = [
+            part.tolist() for pose in self.more_bodies for part in (pose.position, pose.rotation)
+        ]
+        every = inputs, [each.tolist() for each in arrays], more, self.places.kept, self.bodies
+        return sha256(f"{every}{robot_digest(self.robot)}".encode()).hexdigest()
+
+    def poses(self) -> BodyPoses:
+        """Return the poses of the body: of the grid, then those that are given.
+
+        Raises
+        ------
+        InvalidInputError
+            If no pose of the grid is clear of the rock.
+        """
+        with errors_under("bodies"):
+            found = body_poses(self.bodies, self.rock, self.rock_pose, self.robot)
+        near = 1.5 * self.bodies.spacing
+        return found.with_more(self.more_bodies, near, self.bodies.turn)
+
+    def answer(self, question: bytes, bodies: Sequence[Pose]) -> bytes:
+        """Answer a chunk's question.
+
+        Parameters
+        ----------
+        question : bytes
+            As `wall_of` asks it.
+        bodies : sequence of Pose
+            Poses of the body, of `poses`.
+        """
+        chunk = msgspec.msgpack.decode(question, type=Chunk)
+        if chunk.points:
+            up = -self.rock_pose.rotation.T @ self.gravity
+            hand, kept = self.robot.hand, self.places.kept
+            found = best_places(hand, self.rock, self.surface, chunk.points, up, kept)
+            return _written(_place_arrays(*found))
+        poses = [Pose(row[:, 3], row[:, :3]) for row in np.reshape(chunk.poses, (-1, 3, 4))]
+        return _written(vars(reach_table(self.robot, poses, bodies)))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MadeWall:
+    """A wall, and what came of making it.
+
+    Attributes
+    ----------
+    wall : Wall
+    tried : int
+        Number of hands that were tried on the rock.
+    refused : dict of str to int
+        Number of those that were not kept, by reason (`best_places`), the most frequent first.
+    lost_trials, lost_places : int
+        Number of hands that were not tried, and of placements whose reach is unknown and counts as
+        none, as workers died of them.
+    in_rock : int
+        Number of poses of the body that were left out as the body would touch the rock.
+    seconds : dict of str to float
+        Duration of each phase: ``placements``, ``reach`` and ``tables`` [s].
+    """
+
+    wall: Wall
+    tried: int
+    refused: dict[str, int]
+    lost_trials: int
+    lost_places: int
+    in_rock: int
+    seconds: dict[str, float]
+
+
+def wall_of(
+    source: WallSource,
+    bodies: BodyPoses,
+    ask: Ask | None = None,
+    report: WallProgress | None = None,
+) -> MadeWall:
+    """Make a wall from its source.
+
+    Parameters
+    ----------
+    source : WallSource
+    bodies : BodyPoses
+        Its `WallSource.poses`.
+    ask : callable, optional
+        Answers questions of chunks with `WallSource.answer`, somewhere else; in this process by
+        default.
+    report : callable, optional
+        Called with the phase, ``placements`` or ``reach``, the number of finished chunks, and that
+        of all.
+
+    Raises
+    ------
+    InvalidInputError
+        If no hand holds anything on the rock, or a given placement is impossible.
+    DeadlineError
+        If the deadline passes first.
+    """
+    started = time.perf_counter()
+    asked = ask or (lambda every: (source.answer(each, bodies.poses) for each in every))
+    with errors_under("places"):
+        points = place_trials(source.places, source.rock, source.robot.hand)
+    cut = range(0, len(points), source.together)
+    chunks = [points[i : i + source.together] for i in cut]
+    questions = [msgspec.msgpack.encode(Chunk(points=chunk)) for chunk in chunks]
+    found, refused, lost_trials = list[HandPlace](), Counter[str](), 0
+    for chunk, answer in zip(chunks, _asked("placements", questions, asked, report), strict=True):
+        if answer is None:
+            lost_trials += sum(map(len, chunk))
+            continue
+        places, others = _places_of(answer)
+        found += places
+        refused += others
+    limb, rock = source.robot.limbs[0], (source.rock, source.rock_pose, source.surface)
+    hands, parts = _given_places(source)
+    hands = [hand_at(place, *rock, limb) for place in found] + hands
+    parts = [place.parts for place in found] + parts
+    if not hands:
+        raise InvalidInputError(
+            f"no hand holds anything on this rock: {dict(refused)}; try a smaller spacing, or more "
+            "angles",
+            field="places",
+        )
+    placed = time.perf_counter()
+    rows = [np.column_stack([h.pose.rotation, h.pose.position]).ravel().tolist() for h in hands]
+    cut = range(0, len(rows), source.together)
+    grouped = [rows[i : i + source.together] for i in cut]
+    questions = [msgspec.msgpack.encode(Chunk(poses=group)) for group in grouped]
+    tables, lost_places = list[ReachTable](), 0
+    for group, answer in zip(grouped, _asked("reach", questions, asked, report), strict=True):
+        if answer is None:
+            lost_places += len(group)
+            tables.append(_unknown(len(group), len(bodies.poses), source.robot))
+        else:
+            tables.append(ReachTable(**answer))
+    reach = ReachTable.joined(tables)
+    reached = time.perf_counter()
+    apart, gravity = source.places.apart, source.gravity
+    wall = assemble_wall(source.robot, hands, parts, bodies, reach, apart=apart, gravity=gravity)
+    return MadeWall(
+        wall=wall,
+        tried=sum(map(len, points)) - lost_trials,
+        refused=dict(refused.most_common()),
+        lost_trials=lost_trials,
+        lost_places=lost_places,
+        in_rock=bodies.in_rock,
+        seconds={
+            "placements": placed - started,
+            "reach": reached - placed,
+            "tables": time.perf_counter() - reached,
+        },
+    )
+
+
+def _asked(
+    phase: str, questions: Sequence[bytes], ask: Ask, report: WallProgress | None
+) -> Iterator[dict[str, Any] | None]:
+    """Yield the answers as arrays by name, and report the progress."""
+    for i, answer in enumerate(ask(questions)):
+        go_on()
+        deadline.check("the wall was made")
+        if report is not None:
+            report(phase, i + 1, len(questions))
+        yield None if answer is None else _read(answer)
+
+
+def _given_places(source: WallSource) -> tuple[list[HandOnHold], list[HandParts]]:
+    """Return given placements, closed, and their sets."""
+    hands, parts = list[HandOnHold](), list[HandParts]()
+    outcomes = settle_each(source.robot.hand, source.more_places)
+    for i, (hand, outcome) in enumerate(zip(source.more_places, outcomes, strict=True)):
+        if hand.wrist != "fixed":
+            raise UnsupportedError(
+                f"must have a fixed wrist, got {hand.wrist!r}", field=f"more_places[{i}].wrist"
+            )
+        if isinstance(outcome, InvalidInputError):
+            raise outcome.within(f"more_places[{i}]")
+        at = outcome.seating.pose
+        hands.append(
+            replace(
+                hand, hold_pose=None, hold_in_hand=at, at=None, seat="rest", seat_direction=None
+            )
+        )
+        parts.append(HandParts.of(wrench_space(outcome)))
+    return hands, parts
+
+
+def _unknown(places: int, bodies: int, robot: Robot) -> ReachTable:
+    """Return a table in which no limb is known to reach anything, and none is known not to."""
+    shape = places, bodies, len(robot.limbs)
+    none = [np.zeros((0, len(robot.chains[limb].joints))) for limb in robot.limbs]
+    return ReachTable.of(np.zeros(shape, dtype=np.intp), np.ones(shape, dtype=bool), none)
+
+
+def _written(arrays: dict[str, Any]) -> bytes:
+    """Return arrays by name as the bytes of a file."""
+    out = io.BytesIO()
+    np.savez(out, allow_pickle=False, **arrays)
+    return out.getvalue()
+
+
+def _read(answer: bytes) -> dict[str, Any]:
+    with np.load(io.BytesIO(answer), allow_pickle=False) as file:
+        return {name: file[name] for name in file.files}
+
+
+def _place_arrays(places: Sequence[HandPlace], refused: Counter[str]) -> dict[str, Any]:
+    """Return placements and reasons of refusals as arrays by name."""
+    arrays: dict[str, Any] = {
+        "count": np.array(len(places)),
+        "reasons": np.array(list(refused), dtype=str),
+        "refused": np.array(list(refused.values()), dtype=np.intp),
+    }
+    for i, place in enumerate(places):
+        pose = place.rock_in_hand
+        arrays[f"{i}/pose"] = np.column_stack([pose.rotation, pose.position])
+        arrays[f"{i}/numbers"] = np.array([place.outer_rotation, place.lift])
+        for name, value in place.parts._asdict().items():
+            arrays[f"{i}/{name}"] = np.asarray(value)
+    return arrays
+
+
+def _places_of(arrays: dict[str, Any]) -> tuple[list[HandPlace], Counter[str]]:
+    counts = zip(arrays["reasons"].tolist(), arrays["refused"].tolist(), strict=True)
+    places = list[HandPlace]()
+    for i in range(int(arrays["count"])):
+        own = {name: arrays[f"{i}/{name}"] for name in HandParts._fields}
+        own["lengths"] = tuple(own["lengths"].tolist())
+        pose = arrays[f"{i}/pose"]
+        at = Pose(np.ascontiguousarray(pose[:, 3]), np.ascontiguousarray(pose[:, :3]))
+        rotation, lift = arrays[f"{i}/numbers"].tolist()
+        places.append(HandPlace(at, rotation, lift, HandParts(**own)))
+    return places, Counter(dict(counts))

@@ -1,0 +1,206 @@
+"""Walls that are made: the tables are those of their placements and bodies, and move with them."""
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from hand_models.base import (
+    InvalidInputError,
+    Pose,
+    UnsupportedError,
+    turns_about,
+    wrench_transport,
+)
+from hand_models.fixed_wrist import wrench_spaces
+from hand_models.rock import Cylinder, Mesh
+from hand_models.tile import Surface
+from planner import deadline
+from planner.prepare import settle_each
+from planner.programs import WRENCH_UNIT
+from planner.reach import reach_table
+from planner.walls import read_wall, wall_digest, wall_of, write_wall
+from tests.suite.helpers.climbing_walls import arrays_of, tiny_source, tiny_wall
+
+DIRECTIONS = np.random.default_rng(0).normal(size=(10, 6))
+
+
+def test_every_trial_is_counted():
+    made = tiny_wall()
+    assert made.tried == len(made.wall.places) + sum(made.refused.values()) == 40
+    assert (made.lost_trials, made.lost_places, made.in_rock) == (0, 0, 0)
+    assert list(made.refused.values()) == sorted(made.refused.values(), reverse=True)
+    assert len(made.wall.places) > 6
+
+
+def test_reach_in_chunks_is_reach_at_once():
+    wall = tiny_wall().wall
+    whole = reach_table(wall.robot, [place.pose for place in wall.places], wall.bodies)
+    assert 0 < whole.reached.sum() < whole.reached.size
+    for name, value in vars(whole).items():
+        np.testing.assert_array_equal(getattr(wall.reach, name), value)
+    for p, b, limb in np.argwhere(whole.reached)[::50].tolist():
+        np.testing.assert_array_equal(wall.reach.branches(p, b, limb), whole.branches(p, b, limb))
+
+
+def test_supports_are_those_of_the_planner():
+    wall = tiny_wall().wall
+    closed = settle_each(wall.robot.hand, wall.places)
+    found = wall.screening.hands.supports(DIRECTIONS)
+    about = wall.screening.hands.about
+    for place, space, supports in zip(wall.places, wrench_spaces(closed), found, strict=True):
+        moved = Pose(place.pose.position - about, place.pose.rotation)
+        carried = -wrench_transport(moved) / WRENCH_UNIT[:, None]
+        expected = [space.support(way) for way in DIRECTIONS @ carried]
+        np.testing.assert_allclose(supports, expected, rtol=1e-7, atol=1e-7)
+
+
+def test_what_stands_and_falls_with_the_wall_moves_with_it():
+    source, here = tiny_source(), tiny_wall().wall
+    # gravity turns, too
+    moved = Pose(np.array([1.0, -2.0, 0.5]), turns_about([0.3, -0.7, 0.4]))
+    there_source = replace(
+        source, rock_pose=moved @ source.rock_pose, gravity=moved.rotation @ source.gravity
+    )
+    there = wall_of(there_source, there_source.poses()).wall
+    assert len(there.places) == len(here.places)
+    for first, second in zip(
+        [place.pose for place in here.places] + list(here.bodies),
+        [place.pose for place in there.places] + list(there.bodies),
+        strict=True,
+    ):
+        np.testing.assert_allclose((moved @ first).position, second.position, atol=1e-12)
+        np.testing.assert_allclose((moved @ first).rotation, second.rotation, atol=1e-12)
+    np.testing.assert_array_equal(here.apart, there.apart)
+    # a search may end in another branch here and there, where starts are as near
+    assert (here.reach.reached != there.reach.reached).mean() < 0.01
+    turn = np.kron(np.eye(2), moved.rotation)
+    np.testing.assert_allclose(
+        there.screening.hands.supports(DIRECTIONS @ turn.T),
+        here.screening.hands.supports(DIRECTIONS),
+        atol=1e-9,
+    )
+    np.testing.assert_allclose(
+        there.screening.wrenches, here.screening.wrenches @ turn.T, atol=1e-9
+    )
+
+
+def test_given_placements_and_bodies_come_last():
+    source, made = tiny_source(), tiny_wall().wall
+    given = replace(made.places[3], pose=made.places[3].pose, limb="rear_left")
+    body = Pose(made.bodies[0].position + np.array([0.0, 0.02, 0.0]), made.bodies[0].rotation)
+    more = replace(source, more_places=[given], more_bodies=[body])
+    wall = wall_of(more, more.poses()).wall
+    assert len(wall.places) == len(made.places) + 1
+    assert wall.places[-1].limb == "rear_left"
+    np.testing.assert_array_equal(wall.bodies[-1].position, body.position)
+    # the same hand as before, from the same bodies
+    np.testing.assert_array_equal(wall.reach.reached[-1, :-1], made.reach.reached[3])
+    supports = wall.screening.hands.supports(DIRECTIONS)
+    np.testing.assert_allclose(supports[-1], supports[3], rtol=1e-12)
+    assert not wall.apart[-1, 3]
+    assert any(pair.tolist() == [0, len(made.bodies)] for pair in wall.shifts)
+    loose = replace(source, more_places=[replace(given, wrist="compliant")])
+    with pytest.raises(UnsupportedError, match=r"more_places\[0\]\.wrist: must have a fixed"):
+        wall_of(loose, loose.poses())
+
+
+def test_a_wall_is_read_as_it_was_written(tmp_path):
+    source, made = tiny_source(), tiny_wall().wall
+    path = tmp_path / "wall.npz"
+    digest = write_wall(made, path, "a tiny wall")
+    again = read_wall(path, source.robot, source.rock, source.surface)
+    assert wall_digest(again) == wall_digest(made) == digest
+    for name, value in arrays_of(made).items():
+        np.testing.assert_array_equal(arrays_of(again)[name], value)
+    hands = again.screening.hands, made.screening.hands
+    supports = [each.supports(DIRECTIONS) for each in hands]
+    np.testing.assert_allclose(*supports, rtol=1e-9)
+    with np.load(path, allow_pickle=False) as file:
+        assert str(file["format"]) == "crux wall 1"
+        assert str(file["about"]) == "a tiny wall"
+
+
+def test_a_wall_of_something_else_is_not_read(tmp_path):
+    source, path = tiny_source(), tmp_path / "wall.npz"
+    write_wall(tiny_wall().wall, path)
+    robot, rock, surface = source.robot, source.rock, source.surface
+    vertices = rock.triangles.vertices.copy()
+    vertices[0, 2] += 1e-9
+    other = Mesh(vertices, rock.triangles.faces, anywhere=True)
+    with pytest.raises(InvalidInputError, match="file: was made with another rock: make the wall"):
+        read_wall(path, robot, other, surface)
+    with pytest.raises(InvalidInputError, match="was made with another surface"):
+        read_wall(path, robot, rock, Surface.named("sandpaper-36"))
+    with np.load(path) as file:
+        arrays = dict(file)
+    arrays["screening_supports"][0, 0] += 1e-6
+    np.savez(path, **arrays)
+    with pytest.raises(InvalidInputError, match="is damaged"):
+        read_wall(path, robot, rock, surface)
+    np.savez(path, a=1)
+    with pytest.raises(InvalidInputError, match="is not a file of a wall"):
+        read_wall(path, robot, rock, surface)
+
+
+def test_walls_that_no_file_can_have(tmp_path):
+    made = tiny_wall().wall
+    for change in ({"hold": Cylinder(0.3)}, {"hold_in_hand": None}):
+        odd = replace(made, places=(*made.places[1:], replace(made.places[0], **change)))
+        with pytest.raises(UnsupportedError, match="only walls with all placements on one mesh"):
+            write_wall(odd, tmp_path / "wall.npz")
+    assert not list(tmp_path.iterdir())
+
+
+def test_lost_chunks_are_counted_and_the_rest_is_made():
+    source, whole = tiny_source(), tiny_wall().wall
+    bodies = source.poses()
+    calls = []
+
+    def ask(questions):
+        calls.append(questions)
+        for i, question in enumerate(questions):
+            yield None if i == 1 else source.answer(question, bodies.poses)
+
+    made = wall_of(source, bodies, ask)
+    # 6 points of a chunk, two hands at each
+    assert made.lost_trials == 12
+    assert made.tried == 28
+    assert made.lost_places == min(6, len(made.wall.places) - 6)
+    lost = slice(6, 6 + made.lost_places)
+    assert not made.wall.reach.reached[lost].any()
+    assert made.wall.reach.spanned[lost].all()
+    kept = {tuple(place.pose.position) for place in made.wall.places}
+    assert kept < {tuple(place.pose.position) for place in whole.places}
+    assert len(calls) == 2
+
+
+def test_a_deadline_ends_it():
+    source = tiny_source()
+    bodies = source.poses()
+    asked = []
+
+    def ask(questions):
+        for question in questions:
+            asked.append(question)
+            yield source.answer(question, bodies.poses)
+
+    with pytest.raises(deadline.DeadlineError), deadline.within(1e-9):
+        wall_of(source, bodies, ask)
+    assert len(asked) <= 1
+
+
+def test_questions_are_plain_bytes():
+    source = tiny_source()
+    questions = []
+
+    def ask(every):
+        questions.extend(every)
+        return [None] * len(every)
+
+    with pytest.raises(InvalidInputError, match="no hand holds anything on this rock"):
+        wall_of(source, source.poses(), ask)
+    points = [point for each in questions for point in msgspec.msgpack.decode(each)["points"]]
+    assert len(points) == 20
+    assert all(len(trial) == 4 for point in points for trial in point)
