@@ -2,10 +2,14 @@
 
 import functools
 import gc
+import importlib
 import json
 import os
 import signal
+import subprocess
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -25,13 +29,39 @@ settings.load_profile("repeatable")
 LONG = ("test_golden.py", "test_dispatcher.py", "test_service.py", "test_cli.py", "test_closing.py")
 """Files whose tests take longest together, which one process each goes through."""
 
+COLLECT = (sys.executable, "-m", "pytest", "--collect-only", "-q", "-n", "0")
+
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Compile in one process, before many would at once."""
-    if not hasattr(config, "workerinput"):
-        from hand_models.hand import load_closing
+    """Compile and rewrite once, on all cores, what each process of tests would do for itself."""
+    if hasattr(config, "workerinput") or config.option.collectonly:
+        return
+    modules = _uncompiled()
+    if not modules:
+        return
+    with ProcessPoolExecutor(min(len(modules) + 1, os.cpu_count() or 1)) as pool:
+        done = [pool.submit(importlib.import_module, module) for module in modules]
+        done.append(pool.submit(subprocess.run, COLLECT, capture_output=True))
+        for each in done:
+            each.exception()  # that of a test module is its collection's to tell
 
-        load_closing()
+
+def _uncompiled() -> list[str]:
+    """Return modules that numba has not compiled since they changed, those of others first."""
+    sources = [
+        path
+        for package in ("hand_models", "planner", "service")
+        for path in Path(find_spec(package).origin).parent.rglob("*.py")
+        if "@compiled(" in path.read_text()
+    ]
+    return [
+        ".".join(path.relative_to(path.parents[2]).with_suffix("").parts)
+        for path in sorted(sources, key=lambda path: (path.stem == "closing", path))
+        if not any(
+            kept.stat().st_mtime > path.stat().st_mtime
+            for kept in (path.parent / "__pycache__").glob(f"{path.stem}.*.nbi")
+        )
+    ]
 
 
 @pytest.hookimpl(trylast=True)

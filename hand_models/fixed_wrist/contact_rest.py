@@ -80,9 +80,6 @@ CONTACT_SETTINGS: Final = ContactSettings()
 MOVE_UNITS: Final = np.array([1e-3, 1e-2, 1e-2])
 """Units of (z, α, β) in the search [m, rad]: over 0.1 m, the turns move a contact by as much."""
 
-FREE_COMPONENTS: Final = slice(2, 5)
-"""The components f_z, m_x and m_y of a wrench."""
-
 
 def closed_wrench(settled: SettledHand, rounding: float = 0.0) -> Array:
     """Return the wrench on the rock of a hand that has closed and carries nothing.
@@ -110,7 +107,7 @@ def closed_wrench(settled: SettledHand, rounding: float = 0.0) -> Array:
         gaps, tiles = settled.palm.gaps[engaged], settled.hand.palm_tiles[engaged]
         pressing = np.array(settled.palm.engagement) * 0.5 * (np.hypot(gaps, rounding) - gaps)
         pressing *= settled.hand.palm_pressing_stiffness
-        wrench[FREE_COMPONENTS] += pressing.sum(), pressing @ tiles[:, 1], -(pressing @ tiles[:, 0])
+        wrench[2:5] += pressing.sum(), pressing @ tiles[:, 1], -(pressing @ tiles[:, 0])
     return wrench
 
 
@@ -256,7 +253,7 @@ class _Search:
         for k, outcome in zip(within, outcomes, strict=True):
             if isinstance(outcome, SettledHand):
                 wrench = closed_wrench(outcome, self.rounding)
-                found[k] = (wrench * WRENCH_SCALE)[FREE_COMPONENTS]
+                found[k] = (wrench * WRENCH_SCALE)[2:5]  # f_z, m_x and m_y
                 self._closed[which[k]] = True
             else:
                 self._refused.setdefault(int(which[k]), outcome)

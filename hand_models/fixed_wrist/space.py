@@ -38,10 +38,6 @@ __all__ = [
     "wrench_spaces",
 ]
 
-TENDON_COUNT: Final = len(FINGERS)
-
-EACH_TENDON: Final = np.eye(TENDON_COUNT)
-
 HELD_ROWS: Final = np.hstack([HELD_DIRECTIONS, np.zeros_like(HELD_DIRECTIONS)])
 """D of every hand, shape (17, 6): takes a wrench to its force along the `HELD_DIRECTIONS`."""
 
@@ -91,10 +87,10 @@ def wrench_columns(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Arr
     arms[..., 1:] = places
     of_tiles = (arms[..., None] * forces).reshape(*shares.shape, 36)
     # not as a product of matrices: its last digits would depend on how many hands there are
-    sums = _of_fingers(layout, of_tiles).reshape(len(hands), TENDON_COUNT, 4, 3, 3)
+    sums = _of_fingers(layout, of_tiles).reshape(len(hands), len(FINGERS), 4, 3, 3)
     wrenches = MOMENT_MAP @ sums.transpose(0, 3, 2, 4, 1).reshape(len(hands), 3, 12, -1)
     V = np.zeros((len(hands), len(MOMENT_MAP), len(layout.columns)))
-    V[:, :, :TENDON_COUNT] = wrenches[:, 1]
+    V[:, :, : len(FINGERS)] = wrenches[:, 1]
     V[:, :, list(layout.lateral_columns)] = wrenches[:, 2][:, :, list(layout.reacting)]
     if layout.nail_columns:
         axial = arms[:, layout.nails, :, None] * axes[:, layout.nails, :1]
@@ -153,7 +149,7 @@ def limit_rows(
     l0[:, :k], L[:, row, of] = planar.transpose(2, 0, 1)
     s[:, :k] = planes[:, :, 3] * np.where(held > 0.0, held, 1.0)
     if layout.reacting:
-        column = np.zeros(TENDON_COUNT, dtype=np.intp)
+        column = np.zeros(len(FINGERS), dtype=np.intp)
         column[list(layout.reacting)] = layout.lateral_columns
         shares = _of_tiles(hands, "lateral_shares")[:, tile]
         L[:, row, column[of]] = planes[:, :, 2] * shares
@@ -161,9 +157,9 @@ def limit_rows(
         (1.0, 0.0, most[:, None]),
         *model.drive.limits,
     ):
-        own = slice(k, k + TENDON_COUNT)
-        L[:, own, :TENDON_COUNT], l0[:, own], s[:, own] = slope * EACH_TENDON, start, end
-        k += TENDON_COUNT
+        own = slice(k, k + len(FINGERS))
+        L[:, own, : len(FINGERS)], l0[:, own], s[:, own] = slope * np.eye(len(FINGERS)), start, end
+        k += len(FINGERS)
     engaged, tips = np.array(layout.engaged, dtype=np.intp), layout.tips
     signs = (1.0, -1.0)  # of a lateral reaction, and of a twist
     sideways, reacting = (
@@ -221,8 +217,8 @@ def hard_rows(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, A
     drags = loads[:, :, 0] + friction * pressed
     drags[:, :, 0] += _of_tiles(hands, "drag_allowances")
     H, h = np.zeros((*shape, len(layout.columns))), np.zeros(shape)
-    H[:, :TENDON_COUNT, :TENDON_COUNT] = -EACH_TENDON
-    k = TENDON_COUNT
+    H[:, : len(FINGERS), : len(FINGERS)] = -np.eye(len(FINGERS))
+    k = len(FINGERS)
     for tiles, kept in ((layout.touching, drags), (layout.frames, loads[:, :, 1])):
         row, along = k + np.arange(len(tiles)), kept[:, tiles]
         H[:, row, layout.finger_of[tiles]], h[:, row] = -along[:, :, 1], along[:, :, 0]
@@ -275,7 +271,7 @@ def _of_tiles(hands: Sequence[SettledHand], name: str) -> Array:
 
 def _of_fingers(layout: RowLayout, tiles: Array) -> Array:
     """Return sums (h, 4, …) over each finger's tiles (h, n, …)."""
-    starts = np.searchsorted(layout.finger_of, np.arange(TENDON_COUNT))
+    starts = np.searchsorted(layout.finger_of, np.arange(len(FINGERS)))
     return np.asarray(np.add.reduceat(tiles, starts, axis=1))
 
 

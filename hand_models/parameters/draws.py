@@ -49,9 +49,6 @@ __all__ = [
 FITTED_SURFACE: Final = "sandpaper-36"
 """The surface on which a set's tile was fitted; the set has the strength on this surface."""
 
-STIFFNESS_RATIO: Final = "rock_stiffness_ratio"
-"""Entry of a tile: contact stiffness on rock over that of the fitted surface."""
-
 ENTRY_PATH: Final = re.compile(r"(\w+)(?:\[(\d+)\])?")
 """Pattern of an entry's name, or of one number of an entry that is a list, such as ``radii[1]``."""
 
@@ -201,7 +198,7 @@ def draws_of(
         *of_hand, of_law = quantiles[k, surfaces:first].tolist()
         own = _hand_of(sets, k, hand, known, of_hand)
         if ratios is not None:
-            own = own.replaced(ParameterTable({"tile": {STIFFNESS_RATIO: ratios[k]}}))
+            own = own.replaced(ParameterTable({"tile": {"rock_stiffness_ratio": ratios[k]}}))
         law = int(planes[int(of_law * len(planes))])
         draw = ParameterSample(own, strengths, law, tuple(factors[k]), _gripper_of(sets, k))
         with errors_under(f"[{k}]"):
@@ -355,7 +352,7 @@ def _stiffness_ratios(
     sets: ParameterTable, known: ParameterTable, quantiles: Array
 ) -> list[Quantity] | None:
     """Return each sample's contact stiffness on rock over that of the fit; None where known."""
-    if {STIFFNESS_RATIO, "contact_stiffness"} & known.sections.get("tile", {}).keys():
+    if {"rock_stiffness_ratio", "contact_stiffness"} & known.sections.get("tile", {}).keys():
         return None
     entry = sets.quantity("ranges", "rock_stiffness")
     values = [_log_even(sets, "rock_stiffness", u) for u in quantiles.tolist()]

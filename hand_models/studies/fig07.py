@@ -17,10 +17,8 @@ from hand_models.studies.settings import STUDY_SETTINGS
 
 __all__ = ["plot", "run"]
 
-ROD_VARIANTS: Final = {"tiles": False, "tiles and palm": True}
-"""Which pulleys are fixed rods; the value is True if the palm's pulleys are rods, too."""
-
-ROD_COLOURS: Final = {"tiles": "tab:blue", "tiles and palm": "tab:orange"}
+ROD_VARIANTS: Final = {"tiles": (False, "tab:blue"), "tiles and palm": (True, "tab:orange")}
+"""Which pulleys are fixed rods: True if the palm's pulleys are rods, too, and the colour."""
 
 Loaded = list[dict[str, Any]]
 """Configurations of springs, each a dictionary with its loads and gains."""
@@ -91,7 +89,8 @@ def _loaded(experiment: PalmExperiment) -> Loaded:
         if sequence <= sequence[::-1]:
             without = experiment.load(sequence, 0.0)
             loads = {
-                name: experiment.load(sequence, mu, mu * own) for name, own in ROD_VARIANTS.items()
+                name: experiment.load(sequence, mu, mu * own)
+                for name, (own, _) in ROD_VARIANTS.items()
             }
             found.append({
                 "springs": sequence,
@@ -155,7 +154,7 @@ def _draw_sequences(data: dict[str, Any]) -> Figure:
     figure, (loads, gains) = panels(2, 1, (14.0, 7.5), grid="y", sharex=True)
     without = [1e-3 * c["load_without_friction"] for c in shown]
     loads.bar(places - 0.28, without, 0.28, color="0.7", label="bearings everywhere, μ = 0")
-    for shift, (name, colour) in zip((0.0, 0.28), ROD_COLOURS.items(), strict=True):
+    for shift, (name, (_, colour)) in zip((0.0, 0.28), ROD_VARIANTS.items(), strict=True):
         height = [1e-3 * c["load_with_friction"][name] for c in shown]
         label = f"rods at {name}, μ = {data['friction']:g}"
         loads.bar(places + shift, height, 0.28, color=colour, label=label)
@@ -182,7 +181,7 @@ def _draw_dependence(data: dict[str, Any]) -> Figure:
         ("sensitivity", "preload_stiffness", 1e-3),
     )
     for axes, (entries, key, scale), apart in zip(both, of, (0.1, 0.015), strict=True):
-        for side, (name, colour) in zip((-1.0, 1.0), ROD_COLOURS.items(), strict=True):
+        for side, (name, (_, colour)) in zip((-1.0, 1.0), ROD_VARIANTS.items(), strict=True):
             x = np.array([scale * entry[key] + side * apart for entry in data[entries]])
             ranges = [entry["variants"][name] for entry in data[entries]]
             low, middle, high = (

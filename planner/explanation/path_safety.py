@@ -18,7 +18,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import accumulate
-from typing import Final
 
 import numpy as np
 
@@ -34,9 +33,6 @@ from planner.programs import CAP_SLACK, LOAD_UNIT, Outcome, StanceData
 from planner.result import LimitName, TensionPath
 
 __all__ = ["tension_path", "unsafe_sentence"]
-
-TENSION_COLUMNS: Final = tuple(f"{finger}/tension" for finger in FINGERS)
-"""Names of the tension columns of a hand with a fixed wrist."""
 
 
 def tension_path(
@@ -68,7 +64,7 @@ def tension_path(
     z = [y / hand.unit for hand, y in zip(data.hands, loads, strict=True)]
     rows = [hand.L @ part + hand.l0 for hand, part in zip(data.hands, z, strict=True)]
     used = [float(row.max(initial=0.0)) for row in rows]
-    fixed = [i for i, space in enumerate(spaces) if TENSION_COLUMNS[0] in space.columns]
+    fixed = [i for i, space in enumerate(spaces) if f"{FINGERS[0]}/tension" in space.columns]
     changes = {
         i: present[limbs[i]] / LOAD_UNIT - z[i][_columns(spaces[i])]
         for i in fixed
@@ -141,7 +137,7 @@ def _ends(limbs: Sequence[str], spaces: Sequence[WrenchSpace], outcome: Outcome)
 
 
 def _columns(space: WrenchSpace) -> list[int]:
-    return [space.columns.index(name) for name in TENSION_COLUMNS]
+    return [space.columns.index(f"{finger}/tension") for finger in FINGERS]
 
 
 def _pinned(

@@ -13,13 +13,7 @@ from planner.result import Finding, HandPlan
 
 __all__ = ["ONE_OF_A_PLAN", "palm_findings", "stretch_findings"]
 
-PALM_WITHOUT_TRAVEL: Final = "palm_without_travel"
-"""Kind of the finding about a fixed hand's palm."""
-
-TILE_STRETCHED_FAR: Final = "tile_stretched_far"
-"""Kind of the finding about a tile of a hand whose wrist moves."""
-
-ONE_OF_A_PLAN: Final = (PALM_WITHOUT_TRAVEL, TILE_STRETCHED_FAR)
+ONE_OF_A_PLAN: Final = ("palm_without_travel", "tile_stretched_far")
 """Kinds of findings of which a plan has at most one, with its largest value; a route, too."""
 
 
@@ -64,7 +58,7 @@ def palm_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterat
     )
     if not prepared.question.stance.hands[i].grasp.fingernail:
         message += "; 'wrist': 'compliant' plans with wrists that move"
-    yield Finding(PALM_WITHOUT_TRAVEL, f"stance.hands[{i}].wrist", message, lacks, "m")
+    yield Finding("palm_without_travel", f"stance.hands[{i}].wrist", message, lacks, "m")
 
 
 def stretch_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterator[Finding]:
@@ -100,7 +94,7 @@ def stretch_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Ite
         f"hand's largest_tile_stretch of {1e3 * most:.3g} mm{alike}; its stiffness is not known so "
         f"far; {less} stretches it less"
     )
-    yield Finding(TILE_STRETCHED_FAR, f"stance.hands[{i}].wrist", message, stretch, "m")
+    yield Finding("tile_stretched_far", f"stance.hands[{i}].wrist", message, stretch, "m")
 
 
 def _alike(others: int, what: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -26,21 +26,6 @@ class _View(NamedTuple):
     xlabel: str
 
 
-ACCELERATION_VIEWS: Final = (
-    _View(
-        "accelerations, seen from behind the robot",
-        np.array([0.0, -1.0, 0.0]),
-        "to the right, along −y of B [m/s²]",
-    ),
-    _View(
-        "accelerations, seen from its right",
-        np.array([0.0, 0.0, -1.0]),
-        "toward its belly, along −z of B [m/s²]",
-    ),
-)
-"""Planes in which feasible accelerations are drawn."""
-
-
 def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: str) -> None:
     """Draw a section of the body space, and the feasible accelerations from rest, to a file.
 
@@ -57,7 +42,17 @@ def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: s
     title : str
         Title of the picture.
     """
-    views = ACCELERATION_VIEWS if space.accelerates else ()
+    behind = _View(
+        "accelerations, seen from behind the robot",
+        np.array([0.0, -1.0, 0.0]),
+        "to the right, along −y of B [m/s²]",
+    )
+    right = _View(
+        "accelerations, seen from its right",
+        np.array([0.0, 0.0, -1.0]),
+        "toward its belly, along −z of B [m/s²]",
+    )
+    views = (behind, right) if space.accelerates else ()
     outlines = [_accelerations(space, view) for view in views]
     drawn = [(view, outline) for view, outline in zip(views, outlines, strict=True) if outline]
     count = 1 + len(drawn)

@@ -56,9 +56,6 @@ SCENE_STYLES: Final[dict[str, dict[str, Any]]] = {
 }
 """Styles of what a scene has, by kind."""
 
-NOTE_MOVES: Final = np.array([(float(i), float(j)) for i in range(-10, 11) for j in range(-8, 9)])
-"""Shifts of a note that `View.untangle` tries, shape (n, 2), in steps of half a line's height."""
-
 
 @dataclass(frozen=True)
 class View:
@@ -261,11 +258,13 @@ class View:
         dots = self._dots(4.0 * point)
         frame = figure.bbox if self.deep else self.axes.bbox
         placed = np.zeros((0, 4))
+        # shifts that are tried, in steps of half a line's height
+        moves = np.array([(float(i), float(j)) for i in range(-10, 11) for j in range(-8, 9)])
         for note in self.axes.texts:
             if not note.get_text():
                 continue
             box = note.get_window_extent(renderer)
-            shifts = 0.5 * box.height / (note.get_text().count("\n") + 1) * NOTE_MOVES
+            shifts = 0.5 * box.height / (note.get_text().count("\n") + 1) * moves
             moved = box.padded(PICTURE_SETTINGS.note_padding * point).extents + np.tile(shifts, 2)
             apart = (moved[:, None, :2] >= placed[:, 2:]) | (moved[:, None, 2:] <= placed[:, :2])
             free = apart.any(axis=2).all(axis=1)
@@ -274,7 +273,7 @@ class View:
             )
             under = (dots[None] > moved[:, None, :2]) & (dots[None] < moved[:, None, 2:])
             # in steps: a covered dot, leaving the frame, and lying on another note
-            costs = np.hypot(*NOTE_MOVES.T) + 0.6 * under.all(axis=2).sum(axis=1)
+            costs = np.hypot(*moves.T) + 0.6 * under.all(axis=2).sum(axis=1)
             best = int(np.argmin(costs + 1e3 * (2.0 * ~free + ~inside)))
             note.xyann = tuple(np.add(note.xyann, shifts[best] / point))
             placed = np.vstack([placed, moved[best]])

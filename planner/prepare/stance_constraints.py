@@ -54,13 +54,6 @@ least the force's size.
 They are `HELD_DIRECTIONS` and their mirror images toward the rock, except for the first eight,
 which lie in the palm's plane."""
 
-CHANGE_ROWS: Final = tuple(
-    Row(finger, None, TENSION_CHANGE, "hard", f"{finger}/{TENSION_CHANGE}/{way}")
-    for finger in FINGERS
-    for way in ("up", "down")
-)
-"""Names of the hard rows that bound changes of tension, two for each finger."""
-
 
 @dataclass(frozen=True, slots=True)
 class PrepareTolerances:
@@ -197,7 +190,11 @@ class StanceConstraints:
             H.append(C @ space.generators)
             h.append(-(C @ space.origin))
         if self.present is not None and math.isfinite(self.change):
-            hard += CHANGE_ROWS
+            hard += [
+                Row(finger, None, TENSION_CHANGE, "hard", f"{finger}/{TENSION_CHANGE}/{way}")
+                for finger in FINGERS
+                for way in ("up", "down")
+            ]
             columns = np.repeat([space.columns.index(f"{finger}/tension") for finger in FINGERS], 2)
             signs = np.tile([1.0, -1.0], len(FINGERS))
             H.append(signs[:, None] * np.eye(len(space.columns))[columns])

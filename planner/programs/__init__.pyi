@@ -71,7 +71,6 @@ from .stance_data import (
     TWIST_UNIT as TWIST_UNIT,
     WRENCH_UNIT as WRENCH_UNIT,
     WRIST_RANGE as WRIST_RANGE,
-    WRIST_TRAVEL as WRIST_TRAVEL,
     HandData as HandData,
     ScaledRows as ScaledRows,
     StanceData as StanceData,

@@ -29,7 +29,6 @@ __all__ = [
     "TWIST_UNIT",
     "WRENCH_UNIT",
     "WRIST_RANGE",
-    "WRIST_TRAVEL",
     "HandData",
     "HandRows",
     "ScaledRows",
@@ -47,9 +46,6 @@ TWIST_UNIT: Final = pose_units(WRIST_COLUMNS)
 
 WRIST_RANGE: Final = "wrist_range"
 """Name of the hard rows that bound the range in which a compliant hand's set is linearised."""
-
-WRIST_TRAVEL: Final = "wrist_travel"
-"""Name of the hard rows that keep a compliant wrist within its travel."""
 
 JOINT_TORQUE: Final = "joint_torque"
 """Name of the limit rows of a limb's revolute joints."""

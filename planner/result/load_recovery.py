@@ -38,9 +38,6 @@ __all__ = ["LoadRecovery", "recover_floating_hand"]
 PALM_SIGNS: Final = np.array([-1.0, 1.0])
 """Signs of a palm's force on the rock: shear along x, pressing along z."""
 
-WRENCH_ROWS: Final = 6
-"""Rows of a wrench."""
-
 
 class _LoadLayout(NamedTuple):
     """The places of everything in the loads and in the limit rows of all hands.
@@ -132,7 +129,7 @@ def _layout_of(
     rows = [(h, row) for h, own in enumerate(names) for row in own if row.kind == "limit"]
     of_row = np.array([h for h, _ in rows], dtype=np.intp)
     counts = np.bincount(of_row, minlength=len(limits))
-    first_row, most = np.cumsum(counts) - counts, WRENCH_ROWS + int(counts.max())
+    first_row, most = np.cumsum(counts) - counts, 6 + int(counts.max())
     touching = [
         sum(CONTACT_CODES[tile.contact] == CONTACT_CODES["face"] for tile in own) for own in tiles
     ]
@@ -143,7 +140,7 @@ def _layout_of(
     return _LoadLayout(
         columns=loads,
         shape=(len(limits), most),
-        limits=most * of_row + WRENCH_ROWS + np.arange(len(rows)) - first_row[of_row],
+        limits=most * of_row + 6 + np.arange(len(rows)) - first_row[of_row],
         least=np.array([0.0, *(-np.inf if name.endswith(signed) else 0.0 for _, name in named)]),
         tensions=tensions,
         palms=found[:, 3 * count :],
@@ -206,11 +203,11 @@ class LoadRecovery:
         self.at_rest = np.zeros(layout.shape)
         of_sets = [ScaledRows.of(space) for space in spaces] if scaled is None else scaled
         for mine, rest, own in zip(self.rows, self.at_rest, of_sets, strict=True):
-            end, columns = WRENCH_ROWS + len(own.L), own.L.shape[1]
-            mine[:WRENCH_ROWS, :columns], mine[WRENCH_ROWS:end, :columns] = own.generators, own.L
-            rest[:WRENCH_ROWS], rest[WRENCH_ROWS:end] = own.origin, own.l0
+            end, columns = 6 + len(own.L), own.L.shape[1]
+            mine[:6, :columns], mine[6:end, :columns] = own.generators, own.L
+            rest[:6], rest[6:end] = own.origin, own.l0
         slipped = np.array([[hand.closed is not None] for hand in settled])
-        self._released = layout.columns[slipped & ~self.rows[:, :WRENCH_ROWS].any(axis=1)]
+        self._released = layout.columns[slipped & ~self.rows[:, :6].any(axis=1)]
         self._drawn = _drawn_tendons(known)
         self._fixed = (
             tiles,
@@ -247,7 +244,7 @@ class LoadRecovery:
         scaled /= LOAD_UNIT
         rows = (self.rows @ scaled[:, :, None])[:, :, 0]
         rows += self.at_rest
-        wrenches, used = rows[:, :WRENCH_ROWS], rows.take(layout.limits)
+        wrenches, used = rows[:, :6], rows.take(layout.limits)
         efforts = used.take(layout.efforts)
 
         tensions, palms = y.take(layout.tensions), y.take(layout.palms)

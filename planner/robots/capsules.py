@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -22,9 +22,6 @@ from planner.robots.build import ROOT_JOINT, Chain, pose_of
 from planner.robots.robot_file import RobotDescription
 
 __all__ = ["Capsules", "capsules_of", "scene_number"]
-
-SCENE_NUMBERS: Final = bundled_table("scene.toml", "planner.parameters")
-"""Numbers of what is in the way, and of what is usual."""
 
 
 class Capsules(NamedTuple):
@@ -128,4 +125,4 @@ def _given(
 
 def scene_number(section: str, name: str) -> float:
     """Return a positive number of ``parameters/scene.toml``, in SI units."""
-    return SCENE_NUMBERS.positive(section, name)
+    return bundled_table("scene.toml", "planner.parameters").positive(section, name)

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from textwrap import shorten
-from typing import Final, NamedTuple
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -17,9 +17,6 @@ from hand_models.base import Array, InvalidInputError, Pose
 from planner.robots.tolerances import TOLERANCES
 
 __all__ = ["JointElement", "Link", "Mimic", "Urdf", "parse_urdf"]
-
-NUMBER_PATTERN: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
-"""A number of XML: what Pinocchio reads otherwise, as `1_0`, would be a link without mass there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +265,9 @@ def _numbers(
             raise InvalidInputError(f"{place} is missing")
         return [default] * count
     words = raw.split()
-    numbers = [float(word) for word in words] if all(map(NUMBER_PATTERN.fullmatch, words)) else []
+    # what Pinocchio reads otherwise, as `1_0`, would be a link without mass there
+    number = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
+    numbers = [float(word) for word in words] if all(map(number.fullmatch, words)) else []
     # written so that what is not a number fails
     if len(numbers) != count or not all(abs(number) <= largest for number in numbers):
         wanted = "a number" if count == 1 else f"{count} numbers"

@@ -22,7 +22,7 @@ from hand_models.base import Array, Indices
 from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import WRENCH_SCALE
 from planner.prepare import HandBatch, PreparedStance
-from planner.simulation.finger_states import PHALANX_HOLDS, STATE_DIGITS, FingerStates
+from planner.simulation.finger_states import STATE_DIGITS, FingerStates, PhalanxState
 from planner.simulation.passive_loads import BALANCE_SETTINGS, balanced
 
 __all__ = ["Cascade", "CascadeOutcome", "Loads", "StateLoads"]
@@ -226,7 +226,7 @@ class Cascade:
         """Return which tiles hold in each state, shape (S, T)."""
         places, F = self._batch.places, len(self._batch.places.phalanges)
         held = np.zeros((len(states), len(self._phalanx)), dtype=bool)
-        held[:, places.phalanges] = (STATE_DIGITS == PHALANX_HOLDS)[states[:, :F]]
+        held[:, places.phalanges] = (STATE_DIGITS == PhalanxState.HOLDS)[states[:, :F]]
         held[:, places.bases] = states[:, F : 2 * F][:, places.base_fingers] == 0
         return held & self._on
 

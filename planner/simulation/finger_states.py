@@ -14,6 +14,7 @@ hand's posture stays.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Final
 
 import numpy as np
@@ -24,9 +25,16 @@ from hand_models.finger import CONTACT_KINDS
 from hand_models.hand import FINGERS
 from planner.prepare import HandBatch
 
-__all__ = ["PHALANX_DRAGS", "PHALANX_HOLDS", "PHALANX_OFF", "STATE_DIGITS", "FingerStates"]
+__all__ = ["STATE_DIGITS", "FingerStates", "PhalanxState"]
 
-PHALANX_HOLDS, PHALANX_DRAGS, PHALANX_OFF = 0, 1, 2
+
+class PhalanxState(IntEnum):
+    """State of a phalanx in a simulation: its tile holds, drags along the rock, or is off it."""
+
+    HOLDS = 0
+    DRAGS = 1
+    OFF = 2
+
 
 STATE_DIGITS: Final = np.array([[s // 9, s // 3 % 3, s % 3] for s in range(27)])
 """State of the proximal, middle and distal phalanx in each of the 27 states of a finger."""
@@ -98,8 +106,8 @@ class FingerStates:
         joint_of, bears = _supports(batch)
         touching = (touch.touches[own] > 0.0)[:, None]
         framed = (touch.framed[own] > 0.0)[:, None]
-        held = STATE_DIGITS == PHALANX_HOLDS
-        drags = (STATE_DIGITS == PHALANX_DRAGS) & touching
+        held = STATE_DIGITS == PhalanxState.HOLDS
+        drags = (STATE_DIGITS == PhalanxState.DRAGS) & touching
         lifted = ~held & ~drags
         # rows: of each phalanx the joint that it supports
         row = np.arange(count)[:, None]
@@ -122,12 +130,13 @@ class FingerStates:
         short = room.min(axis=2) < -tolerance
         worst = room.argmin(axis=2)
         after = (
-            np.arange(27) + (PHALANX_OFF - STATE_DIGITS[np.arange(27), worst]) * PLACE_VALUES[worst]
+            np.arange(27)
+            + (PhalanxState.OFF - STATE_DIGITS[np.arange(27), worst]) * PLACE_VALUES[worst]
         )
         rests = np.where(short, after, np.arange(27))
         for _ in range(2 * len(PLACE_VALUES)):
             rests = rests[row, rests]
-        kind = np.where(N >= 0.0, PHALANX_DRAGS, PHALANX_OFF)
+        kind = np.where(N >= 0.0, PhalanxState.DRAGS, PhalanxState.OFF)
         slipped = np.arange(27)[:, None] + (kind - STATE_DIGITS) * PLACE_VALUES
         slips = rests[row[:, None], np.where(held & touching & ~drags, slipped, rests[..., None])]
         lifts = np.zeros((count, 27), dtype=bool)

@@ -18,15 +18,6 @@ from service.commands import options, stances
 
 __all__ = ["new_command", "plan_command", "redundancy_command"]
 
-ROBOT_COMMENT = """\
-# A robot: its URDF, where its hands are mounted, and what its joints bear. This is RoboSimian.
-# Use it with: crux plan STANCE --robot FILE
-# A bare number is in SI units and counts as assumed. In place of a limb's orientation, a quaternion
-# [x, y, z, w]: rpy = [roll, pitch, yaw], or x_axis and z_axis.
-
-"""
-"""What begins a new robot's file."""
-
 
 @click.command("plan")
 @options.stance_argument
@@ -280,7 +271,13 @@ def new_command(kind: str, file: Path | None) -> int:
         robot, urdf = planner.RobotFile.bundled(), file.with_suffix(".urdf")
         _check_new(file)
         _write(urdf, robot.urdf)
-        text = re.sub(r"\A(#.*\n)+\n", ROBOT_COMMENT, robot.toml)
+        comment = (
+            "# A robot: its URDF, where its hands are mounted, and what its joints bear. This is"
+            " RoboSimian.\n# Use it with: crux plan STANCE --robot FILE\n# A bare number is in SI"
+            " units and counts as assumed. In place of a limb's orientation, a quaternion\n#"
+            " [x, y, z, w]: rpy = [roll, pitch, yaw], or x_axis and z_axis.\n\n"
+        )
+        text = re.sub(r"\A(#.*\n)+\n", comment, robot.toml)
         text = text.replace(f'name = "{robot.name}"', 'name = "mine"', 1)
         text = re.sub(r'(?m)^urdf = "[^"]*"', f'urdf = "{urdf.name}"', text)
     else:

@@ -17,8 +17,6 @@ from service.commands import options, stances
 
 __all__ = ["stream_command"]
 
-_NOTE_INDENT = " " * 11  # under the status
-
 
 @click.command("stream")
 @options.stance_argument
@@ -153,10 +151,10 @@ def _say_cells(head: str, cells: Sequence[str], width: int) -> None:
 
 def _say_line(reply: replies.SetPointsReply, width: int) -> None:
     """Write set-points: each hand's four tensions, in whole newtons, and what a slip leaves."""
-    said = "; ".join(_remarks(reply))
+    said, under = "; ".join(_remarks(reply)), " " * 11  # under the status
     if reply.hands is None or reply.utilisation is None or reply.gap is None:
         head = f"{reply.status:<10} {'-':>6} {'-':>5} {reply.source:<12} "
-        click.echo(textwrap.fill(said, width, initial_indent=head, subsequent_indent=_NOTE_INDENT))
+        click.echo(textwrap.fill(said, width, initial_indent=head, subsequent_indent=under))
         return
     _say_cells(
         f"{reply.status:<10} {reply.utilisation:6.3f} {reply.gap:5.0e} {reply.source:<12}",
@@ -164,9 +162,7 @@ def _say_line(reply: replies.SetPointsReply, width: int) -> None:
         width,
     )
     if said:
-        click.echo(
-            textwrap.fill(said, width, initial_indent=_NOTE_INDENT, subsequent_indent=_NOTE_INDENT)
-        )
+        click.echo(textwrap.fill(said, width, initial_indent=under, subsequent_indent=under))
 
 
 def _remarks(reply: replies.SetPointsReply) -> Iterator[str]:

@@ -6,16 +6,13 @@ import json
 import re
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import Any, Final
+from typing import Any
 
 import msgspec
 
 from service.wire.errors import MalformedError
 
 __all__ = ["refuse_in_json", "refuse_in_msgpack"]
-
-LONG_LIST: Final = re.compile(rb":[ \t\n\r]*\[[-+0-9.eE,\[\] \t\n\r]{1000,}\](?=[ \t\n\r]*[,}])")
-"""Pattern of a long list of numbers, or of lists of them, as an object's value."""
 
 
 def refuse_in_json(payload: bytes) -> None:
@@ -31,7 +28,9 @@ def refuse_in_json(payload: bytes) -> None:
     MalformedError
         If a key is repeated; the error's ``field`` is the path of the key.
     """
-    short = LONG_LIST.sub(b":[]", payload) if _is_long(payload) else payload
+    # a long list of numbers, or of lists of them, as an object's value, has no keys
+    long_list = rb":[ \t\n\r]*\[[-+0-9.eE,\[\] \t\n\r]{1000,}\](?=[ \t\n\r]*[,}])"
+    short = re.sub(long_list, b":[]", payload) if _is_long(payload) else payload
     found: list[_Repeated] = []
     # numbers stay text, also those of thousands of digits
     read = json.JSONDecoder(
