@@ -114,7 +114,7 @@ def giving_way(hold):
         for _ in range(16):
             axes = random_axes(rng, 0.3)
             origin = np.array([*rng.uniform(-0.05, 0.0, 2), -rng.uniform(0.005, 0.02)])
-            rock = hold.finger_rock(origin, axes[:, 0], axes[:, 2])
+            rock = hold.finger_rock(origin, axes[:, 0], axes[:, 2], HAND.finger.size)
             closings.append(OpenFinger(rock, SANDPAPER, 37.0))
         for closing, closed in zip(closings, close_all(HAND.finger, closings), strict=True):
             if isinstance(closed, ClosedFinger) and any(c.stop for c in closed.finger.contacts):

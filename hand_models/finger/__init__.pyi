@@ -3,6 +3,7 @@ from .closed_finger import (
     Refused as Refused,
     cling as cling,
     close_all as close_all,
+    lay_across as lay_across,
     straight_lift as straight_lift,
 )
 from .closure import settle_finger as settle_finger

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, Indices
+from hand_models.finger.closure_loads import stays, tendon_loads
 from hand_models.finger.model import PHALANGES, FingerModel
 from hand_models.finger.path_state import (
     JOINT_COUNT,
@@ -18,11 +20,20 @@ from hand_models.finger.path_state import (
     open_states,
 )
 from hand_models.finger.phalanx_shape import PhalanxShape, fan_out
+from hand_models.finger.sequential_closure import SequentialClosure
 from hand_models.finger.settings import CONTACT_CODES
 from hand_models.finger.settled_finger import JOINT_STOPS, Contact, SettledFinger
 from hand_models.sections import Complexes, Face, FingerRock, Flags, Outlines, Section
 
-__all__ = ["ClosedFinger", "Refused", "cling", "close_all", "starting_angles", "straight_lift"]
+__all__ = [
+    "ClosedFinger",
+    "Refused",
+    "cling",
+    "close_all",
+    "lay_across",
+    "starting_angles",
+    "straight_lift",
+]
 
 
 class ClosedFinger(NamedTuple):
@@ -36,7 +47,9 @@ class ClosedFinger(NamedTuple):
         joint's stop, at zero tension [N·m] and per newton [m]. See `SettledFinger.shears`,
         `SettledFinger.normals` and `SettledFinger.stop_torques`.
     touches : tuple of float, length 3
-        Tension at which each phalanx first touched the rock [N]; NaN if it never did.
+        Tension at which each phalanx first touched the rock [N]; NaN if it never did, or is laid.
+    laid : bool
+        Whether the finger was laid on the rock, without following its path.
     """
 
     finger: SettledFinger
@@ -44,6 +57,13 @@ class ClosedFinger(NamedTuple):
     normals: Array
     torques: Array
     touches: tuple[float, ...] = (np.nan,) * len(PHALANGES)
+    laid: bool = False
+
+    def mirrored(self) -> ClosedFinger:
+        """Return the same finger on the mirror image of its rock across its plane."""
+        finger = self.finger
+        contacts = tuple([replace(each, across=-each.across) for each in finger.contacts])
+        return self._replace(finger=SettledFinger(finger.model, contacts))
 
 
 class Refused(NamedTuple):
@@ -90,6 +110,57 @@ def cling(model: FingerModel, section: Section | None) -> ClosedFinger | Refused
     return ClosedFinger(SettledFinger(model, tuple(contacts)), nothing, nothing, nothing)
 
 
+def lay_across(
+    model: FingerModel, solver: SequentialClosure, opened: OpenFinger
+) -> ClosedFinger | None:
+    """Return a finger that ends its closing laid on rock that is not alike across it.
+
+    Its phalanges rest with the faces of their tiles, which have a part of their spines on the rock.
+
+    Parameters
+    ----------
+    model : FingerModel
+    solver : SequentialClosure
+        Of the same model.
+    opened : OpenFinger
+
+    Returns
+    -------
+    ClosedFinger or None
+        None for a finger that closes otherwise.
+    """
+    from hand_models.finger.closing import around_rock
+
+    section, closing = opened.rock.tile, opened.tension
+    laid = [] if section is None else solver.lay(section)
+    if len(laid) < JOINT_COUNT:
+        return None
+    depths = closing * model.depths(opened.base_tile)
+    laid = [each.pressed(solver.tile, depth) for each, depth in zip(laid, depths, strict=True)]
+    shape = PhalanxShape.of(model)
+    rock = Outlines.of([opened.rock], model.size.reach, shape.spacing)
+    q = np.diff([0.0, *(each.angle for each in laid)])
+    around = around_rock(rock, shape, drives(model, [opened]), q[None])[0]
+    shares = around["share"].tolist()
+    # a frame that stands in the rock, or a tile without spines on it
+    if around["gap"].min() < -shape.closes or min(shares) == 0.0:
+        return None
+    loads = tendon_loads(model, laid, closing, opened.base_tile, shares)
+    if loads is None or not stays(loads, opened.surface, closing, shares):
+        return None
+    contacts = [
+        Contact(
+            angle, (joint.real, joint.imag), along, "face", engagement=share, across=float(across)
+        )
+        for (angle, _, joint, along, _), share, across in zip(
+            laid, shares, around["across"], strict=True
+        )
+    ]
+    shears, normals = (np.array([[each.real, each.imag] for each in of_kind]) for of_kind in loads)
+    finger = SettledFinger(model, tuple(contacts))
+    return ClosedFinger(finger, shears, normals, np.zeros((JOINT_COUNT, 2)), laid=True)
+
+
 def close_all(
     model: FingerModel, closings: Sequence[OpenFinger], hands: Sequence[Hashable] | None = None
 ) -> list[ClosedFinger | Refused]:
@@ -113,7 +184,7 @@ def close_all(
 
     shape = PhalanxShape.of(model)
     rocks = [closing.rock for closing in closings]
-    rock = Outlines.of(rocks, model.reach + model.tile_length, shape.spacing)
+    rock = Outlines.of(rocks, model.size.reach, shape.spacing)
     drive = drives(model, closings)
     q = starting_angles(rocks, rock, shape, drive)
     lower, bent = drive["lower"], (q != _straight(drive)).any(axis=1).nonzero()[0]
@@ -159,7 +230,7 @@ def straight_lift(model: FingerModel, opened: OpenFinger) -> float:
     Zero if no rock is in the finger; infinite if the finger's length is not enough.
     """
     shape, drive = PhalanxShape.of(model), drives(model, [opened])
-    rock = Outlines.of([opened.rock], model.reach + model.tile_length, shape.spacing)
+    rock = Outlines.of([opened.rock], model.size.reach, shape.spacing)
     q = _straight(drive)
     if not opened.rock.sections or not _in_rock(rock, shape, drive, [opened.rock], q)[0]:
         return 0.0

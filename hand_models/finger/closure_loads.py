@@ -13,18 +13,25 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from hand_models.finger.model import FingerModel
+from hand_models.finger.model import PHALANGES, FingerModel
 from hand_models.finger.sequential_closure import ClosedPhalanx
 from hand_models.tile import Surface
 
 __all__ = ["stays", "tendon_loads"]
+
+WHOLE = (1.0,) * len(PHALANGES)
+"""Shares of tiles whose spines are all on the rock."""
 
 Loads = tuple[list[complex], list[complex]]
 """Shears and normal loads of a finger's phalanges, proximal first: a + i b, affine in tension."""
 
 
 def tendon_loads(
-    model: FingerModel, laid: Sequence[ClosedPhalanx], closing: float, base_tile: bool
+    model: FingerModel,
+    laid: Sequence[ClosedPhalanx],
+    closing: float,
+    base_tile: bool,
+    shares: Sequence[float] = WHOLE,
 ) -> Loads | None:
     """Return shear and normal load of each phalanx of a finger that rests on all three.
 
@@ -37,6 +44,8 @@ def tendon_loads(
         Tension at which the tiles caught the rock [N].
     base_tile : bool
         Whether a base tile comes first on the tendon.
+    shares : sequence of float, length 3, optional
+        Share of each tile's spines on the rock.
 
     Returns
     -------
@@ -51,7 +60,7 @@ def tendon_loads(
     before = 0.0
     for i, (angle, _, _, _, _) in enumerate(laid):
         loss, gain = (1.0 - model.friction) ** (i + base_tile), model.shear_gain[i]
-        shears.append(loss * complex((model.engagement[i] - gain) * closing, gain))
+        shears.append(shares[i] * loss * complex((model.engagement[i] - gain) * closing, gain))
         # what spring and tendon turn its joint with
         spring = model.joint_stiffness[i] * (angle - before) + model.joint_preload[i]
         left.append(complex(-spring, loss * model.pulley_radii[i]))
@@ -69,7 +78,7 @@ def tendon_loads(
     return shears, normals
 
 
-def stays(loads: Loads, surface: Surface, tension: float) -> bool:
+def stays(loads: Loads, surface: Surface, tension: float, shares: Sequence[float] = WHOLE) -> bool:
     """Return True if no contact of a finger that rests on all phalanges breaks at a tension.
 
     A contact that is pulled off the rock breaks if its drag is less than μ times the pull, or if
@@ -83,8 +92,10 @@ def stays(loads: Loads, surface: Surface, tension: float) -> bool:
     surface : Surface
     tension : float
         Tension of the tendon [N].
+    shares : sequence of float, length 3, optional
+        Share of each tile's spines on the rock.
     """
-    for t, n in zip(*loads, strict=True):
+    for t, n, share in zip(*loads, shares, strict=True):
         normal = n.real + n.imag * tension
         if normal >= 0.0:
             continue
@@ -92,8 +103,8 @@ def stays(loads: Loads, surface: Surface, tension: float) -> bool:
         if shear < -surface.friction * normal:
             return False
         # a tile that slips under shear keeps its contact
-        if shear > surface.shear_limit:
+        if shear > share * surface.shear_limit:
             continue
-        if math.hypot(shear, normal) > surface.strength(math.atan2(-normal, shear)):
+        if math.hypot(shear, normal) > share * surface.strength(math.atan2(-normal, shear)):
             return False
     return True

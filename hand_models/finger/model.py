@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError
-from hand_models.parameters import ParameterTable, check_widths
+from hand_models.parameters import ParameterTable, check_widths, scan_table
+from hand_models.sections import FingerSize
 
 __all__ = ["PHALANGES", "FingerModel"]
 
@@ -159,6 +160,13 @@ class FingerModel:
     def reach(self) -> float:
         """Largest distance from the proximal joint at which a finger may touch anything [m]."""
         return len(self.pulley_radii) * self.joint_spacing + self.tile_height
+
+    @property
+    def size(self) -> FingerSize:
+        """Sizes that say which rock the finger meets, with a tile's length beyond its reach."""
+        strip = scan_table().scalar("cut", "strip")
+        reach = self.reach + self.tile_length
+        return FingerSize(reach, self.tile_width, self.frame_width, strip)
 
     @property
     def tile_range(self) -> tuple[float, float]:

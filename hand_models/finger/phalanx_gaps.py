@@ -281,6 +281,7 @@ def _engaged(settings: Record, gap: float, travel: float, exponent: float) -> fl
 @compiled()
 def _on_rock(
     places: Complexes,
+    ways: Complexes,
     behind: Array,
     near: Indices,
     across: Array,
@@ -301,12 +302,20 @@ def _on_rock(
     if tile_gap >= shape.travel:
         return 0.0, 0.0
     away = _from_line(places[near], joint, u, shape.near, shape.far, shape.lift)
-    least, farther = away.min(), np.full(strips, math.inf)
+    least, farther, back = away.min(), np.full(strips, math.inf), u.conjugate()
     for i in range(len(near)):
         # no spine reaches beyond its travel
         if away[i] - least + tile_gap < shape.travel:
+            place, way = (places[near[i]] - joint) * back, ways[near[i]] * back
             for k in range(strips):
-                farther[k] = min(farther[k], away[i] + behind[near[i], k])
+                depth = behind[near[i], k]
+                above = place.imag + depth * way.imag - shape.lift
+                # farther than what is nearest already, or nothing
+                if depth == math.inf or above >= farther[k]:
+                    continue
+                along = place.real + depth * way.real
+                along -= _clipped(along, shape.near, shape.far)
+                farther[k] = min(farther[k], math.sqrt(along * along + above * above))
     total, middle = 0.0, 0.0
     for k in range(strips):
         part = _engaged(settings, tile_gap + (farther[k] - least), shape.travel, shape.exponent)
@@ -317,7 +326,7 @@ def _on_rock(
 
 @compiled(
     *(SETTINGS_RECORD.dtype, SHAPE_FIELDS, "f1", "f1", AROUND_FIELDS),
-    *("c1", "f1", "c1", "f1", "f1", "b1", "c1", "f2", "f1"),
+    *("c1", "f1", "c1", "f1", "f1", "b1", "c1", "c1", "f2", "f1"),
 )
 def put_around(
     settings: Record,
@@ -332,6 +341,7 @@ def put_around(
     longest: Array,
     bare: Flags,
     places: Complexes,
+    ways: Complexes,
     behind: Array,
     across: Array,
 ) -> None:
@@ -347,7 +357,7 @@ def put_around(
         Joint angles [rad].
     found : record of `AROUND_FIELDS`
         Result, written over.
-    points, lengths, centres, radii, longest, bare, places, behind, across : ndarray
+    points, lengths, centres, radii, longest, bare, places, ways, behind, across : ndarray
         Rock in the finger's plane, a row of `Outlines`.
     """
     count, turn, bar, found = len(q), settings[0].derivative_turn, shape[0], found[0]
@@ -379,7 +389,7 @@ def put_around(
                 away = _from_line(places, joint, along, bar.near, bar.far, bar.lift)
                 strips = np.flatnonzero(away <= away.min() + reach)
             share, middle = _on_rock(
-                places, behind, strips, across, settings[0], bar, joint, along, tile_gap
+                places, ways, behind, strips, across, settings[0], bar, joint, along, tile_gap
             )
             # a phalanx that presses aside, with its end, has its spines beside the rock
             share = _engaged(settings[0], 1.0 - share * push.imag, 1.0, 1.0)

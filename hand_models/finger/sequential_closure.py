@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 from hand_models.finger.model import FingerModel
 from hand_models.finger.phalanx_shape import PhalanxShape, middle_of_bed
-from hand_models.sections import Face, SmoothSection
+from hand_models.sections import Face, Section
 
 __all__ = ["CONTACT_KINDS", "ClosedPhalanx", "SequentialClosure"]
 
@@ -86,19 +86,19 @@ class SequentialClosure:
             for lower, upper in zip(model.joint_lower, model.joint_upper, strict=True)
         ]
 
-    def lay(self, cut: SmoothSection) -> list[ClosedPhalanx]:
+    def lay(self, cut: Section) -> list[ClosedPhalanx]:
         """Close a finger on smooth rock, with its proximal joint at the origin of F.
 
         Parameters
         ----------
-        cut : SmoothSection
+        cut : Section
             Rock in the finger's plane.
 
         Returns
         -------
         list of ClosedPhalanx
             Phalanges from the base outward, up to the first that does not rest on its tile's face:
-            three for a finger that is laid, none where the section is `SmoothSection.skew`.
+            three for a finger that is laid, none where the section is `Section.skew`.
         """
         laid: list[ClosedPhalanx] = []
         joint, angle, u = 0j, 0.0, 1.0 + 0j
@@ -125,9 +125,7 @@ class SequentialClosure:
             joint += self._spacing * u
         return laid
 
-    def _bends(
-        self, cut: SmoothSection, joint: complex, u: complex, along: float
-    ) -> tuple[float, float]:
+    def _bends(self, cut: Section, joint: complex, u: complex, along: float) -> tuple[float, float]:
         """Return the rock's curvature from a contact toward both ends of the tile."""
         ends = self.tile.start, self.tile.end
         places = (joint + complex(end, self.tile.height) * u for end in ends)

@@ -26,6 +26,7 @@ from hand_models.finger import (
     Refused,
     cling,
     close_all,
+    lay_across,
     stays,
     tendon_loads,
 )
@@ -163,9 +164,14 @@ def close_fingers(
         if i in errors:
             continue
         known: dict[Hashable, int] = {}
-        for k, (phalanges, base_tile) in enumerate(
-            zip(laid[i], hand.rubbing, strict=True), len(FINGERS) * i
+        cuts = placed.cuts(i)
+        alike = [False] * len(FINGERS) if cuts is None else cuts.alike
+        for k, (phalanges, base_tile, same) in enumerate(
+            zip(laid[i], hand.rubbing, alike, strict=True), len(FINGERS) * i
         ):
+            if not same:
+                left.append(k)
+                continue
             key = tuple(phalanges), base_tile
             if key not in known:
                 row = _row_laid(hand, placement, phalanges, tension, base_tile)
@@ -182,8 +188,10 @@ def close_fingers(
     for k, finger in sorted(found, key=lambda each: not _in_rock(each[1])):
         i = k // len(FINGERS)
         if isinstance(finger, ClosedFinger):
-            alone[k], row_of[k] = finger, len(rows)
+            row_of[k] = len(rows)
             rows.append(_row_alone(finger))
+            if not finger.laid:
+                alone[k] = finger
             continue
         if _in_rock(finger):
             lifts[i] = max(finger.lift, lifts.get(i, 0.0))
@@ -222,27 +230,41 @@ def _alone(
 ) -> list[ClosedFinger | Refused]:
     """Close fingers that could not be left as laid, those that are alike once."""
     hand = placed.hand
-    keys: list[Hashable] = []
+    keys: list[tuple[Hashable, float]] = []
     closings: dict[tuple[Hashable, ...], OpenFinger] = {}
+    sides: dict[Hashable, float] = {}
     closed: dict[Hashable, ClosedFinger | Refused] = {}
     for k in left:
         i, finger = divmod(k, len(FINGERS))
         placement, cuts = placed.placements[i], placed.cuts(i)
         if placement.grasp.fingernail:
-            keys.append(k)
+            keys.append((k, 1.0))
             closed[k] = cling(hand.finger, placed.section(i, finger))
             continue
         given = placement.surface, tensions[i], hand.rubbing[finger]
-        key = (k if cuts is None else (cuts[0], cuts[1][finger]), *given)
-        keys.append(key)
-        if key not in closings:
-            closings[key] = OpenFinger(placed.rock(i, finger), *given)
+        key = (k if cuts is None else (cuts.shape, cuts.keys[finger]), *given)
+        side = 1.0 if cuts is None else cuts.sides[finger]
+        if key not in sides:
+            sides[key], opened = side, OpenFinger(placed.rock(i, finger), *given)
+            laid = None
+            if cuts is not None and not cuts.alike[finger]:
+                laid = lay_across(hand.finger, hand.sequential_closure, opened)
+            if laid is None:
+                closings[key] = opened
+            else:
+                closed[key] = laid
+        keys.append((key, side * sides[key]))
     if closings:
         # what is alike is of several hands, and is by itself
         hands = [key[0] // len(FINGERS) if isinstance(key[0], int) else key for key in closings]
         found = close_all(hand.finger, list(closings.values()), hands)
         closed.update(zip(closings, found, strict=True))
-    return [closed[key] for key in keys]
+    mirrored = {
+        key: each.mirrored() if isinstance(each, ClosedFinger) else each
+        for key, each in closed.items()
+        if (key, -1.0) in keys
+    }
+    return [closed[key] if side > 0.0 else mirrored[key] for key, side in keys]
 
 
 def _no_way(placed: PlacedHands, index: int, finger: int, refused: Refused) -> InvalidInputError:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -12,7 +11,7 @@ from hand_models.base import Array, Pose
 from hand_models.finger import CONTACT_KINDS, PHALANGES
 from hand_models.hand.names import FINGERS
 from hand_models.rock import Hold
-from hand_models.sections import FingerRock, Section
+from hand_models.sections import FingerRock, FingerSize, Section
 
 __all__ = ["HAND_Z", "OUTER_FINGERS", "STACK_ROWS", "TILE_COLUMNS", "FingerFrame", "FrameStack"]
 
@@ -86,11 +85,14 @@ class FingerFrame:
         Place of the proximal joint [m].
     along, across : ndarray, shape (3,)
         Unit vectors along the open finger, and across its plane (z × along).
+    size : FingerSize
+        Sizes of the finger that say which rock it meets.
     """
 
     joint: Array
     along: Array
     across: Array
+    size: FingerSize
 
     def cut(self, hold: Hold, hand_in_hold: Pose, *, raw: bool = False) -> Section | None:
         """Return the rock in the finger's plane, in its coordinates F; None if there is none.
@@ -105,11 +107,13 @@ class FingerFrame:
             Whether to use `Hold.raw_section`, with steps and edges smaller than a tile.
         """
         plane = self._plane(hand_in_hold)
-        return hold.raw_section(*plane) if raw else hold.finger_rock(*plane, tiles_only=True).tile
+        if raw:
+            return hold.raw_section(*plane)
+        return hold.finger_rock(*plane, self.size, tiles_only=True).tile
 
     def rock(self, hold: Hold, hand_in_hold: Pose) -> FingerRock:
         """Return the rock under the finger's whole width, in its frame F; arguments as of `cut`."""
-        return hold.finger_rock(*self._plane(hand_in_hold))
+        return hold.finger_rock(*self._plane(hand_in_hold), self.size)
 
     def _plane(self, hand_in_hold: Pose) -> tuple[Array, Array, Array]:
         """Return origin and axes of the finger's plane in the hold's frame."""
@@ -144,7 +148,9 @@ class FrameStack:
     base_tiles: Array
 
     @classmethod
-    def of(cls, joints: Array, alongs: Array, bases: Array, palm: Array) -> FrameStack:
+    def of(
+        cls, joints: Array, alongs: Array, bases: Array, palm: Array, size: FingerSize
+    ) -> FrameStack:
         """Return the frames of n hands.
 
         Parameters
@@ -155,6 +161,8 @@ class FrameStack:
             Base tiles of the outer fingers, left first, in H [m].
         palm : ndarray, shape (t, 3)
             Tiles of the palm, in H [m].
+        size : FingerSize
+            Of each finger.
         """
         count, into = len(joints), np.broadcast_to(HAND_Z, alongs.shape)
         acrosses = np.stack(
@@ -177,7 +185,7 @@ class FrameStack:
         for array in (joints, alongs, acrosses, *stacks):
             array.setflags(write=False)
         hands = [
-            tuple(itertools.starmap(FingerFrame, zip(*hand, strict=True)))
+            tuple(FingerFrame(*finger, size) for finger in zip(*hand, strict=True))
             for hand in zip(joints, alongs, acrosses, strict=True)
         ]
         return cls(tuple(hands), *stacks)

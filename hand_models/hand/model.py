@@ -173,7 +173,7 @@ class HandModel:
         )
         bases = (joints + alongs * (self.base_tile_reach - self.outer_reach))[:, OUTER_FINGERS]
         bases[..., 2] = self.base_tile_surface
-        return FrameStack.of(joints, alongs, bases, self.palm_tiles)
+        return FrameStack.of(joints, alongs, bases, self.palm_tiles, self.finger.size)
 
     def palm_share(self, engaged: tuple[int, ...], tile_limit: float) -> float:
         """Return the shear of a palm when the first of its engaged tiles reaches its limit [N].

@@ -8,13 +8,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Pose
+from hand_models.base import BASE_TOLERANCES, Pose
 from hand_models.hand.finger_frames import STACK_ROWS
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
 from hand_models.hand.seating import Seating
 from hand_models.rock import Hold
-from hand_models.sections import FingerPlane, FingerRock, Section, Swept, entry_distances
+from hand_models.sections import (
+    FingerPlane,
+    FingerRock,
+    Section,
+    Swept,
+    alike_across,
+    entry_distances,
+)
 from hand_models.tile import Surface
 
 __all__ = ["PlacedHands", "Placement", "PlacementKey"]
@@ -69,6 +76,61 @@ def _digits(pose: Pose | None) -> Hashable:
     return tuple(np.asarray(part, dtype=float).tobytes() for part in (pose.position, pose.rotation))
 
 
+class SmoothCuts(NamedTuple):
+    """A smooth hold's shape, and how the fingers of a hand meet it.
+
+    Attributes
+    ----------
+    shape : Swept
+    keys : tuple of tuple
+        Numbers that are equal for fingers that are mirror images of each other.
+    sides : tuple of float
+        1 or −1, different for two such fingers if one's left is the other's right.
+    planes : sequence of FingerPlane or None
+        Plane in which `cut_of` cuts what each finger meets with its tiles; None where that is not
+        a cut. Planes are equal for fingers that are mirror images, so that each is cut once.
+    alike : sequence of bool
+        Whether the rock is alike across each finger.
+    """
+
+    shape: Swept
+    keys: tuple[tuple[FingerPlane, tuple[float, float, float]], ...]
+    sides: tuple[float, ...]
+    planes: Sequence[FingerPlane | None]
+    alike: Sequence[bool]
+
+
+def _cut(
+    origin: list[float], along: list[float], into: list[float], across: list[float]
+) -> tuple[tuple[FingerPlane, tuple[float, float, float]], float]:
+    """Return key and side of a finger, as of `SmoothCuts`, by its plane and the way across it."""
+    (a, b, c), (d, e, f), (x, y, z), (u, v, w) = along, into, origin, across
+    # every swept hold is its own mirror image in x and in y
+    if (a or d or x) < 0.0:
+        a, d, x, u = -a, -d, -x, -u
+    if (b or e or y) < 0.0:
+        b, e, y, v = -b, -e, -y, -v
+    side = -1.0 if (u or v or w) < 0.0 else 1.0
+    return ((a, b, c, d, e, f, x, y, z), (side * u, side * v, side * w)), side
+
+
+def _nearest_plane(
+    plane: FingerPlane, across: tuple[float, float, float], half: float
+) -> FingerPlane | None:
+    """Return the plane beside a finger's, at most so far, in which a ball comes nearest to it [m].
+
+    None where the nearest places are in no such plane.
+    """
+    (a, b, c, d, e, f, *origin), (u, v, w) = plane, across
+    x, y, z = origin
+    square = u * u + v * v + w * w
+    least = BASE_TOLERANCES.relative * square
+    if max(abs(a * u + b * v + c * w), abs(d * u + e * v + f * w)) > least:
+        return None
+    far = min(max(-(x * u + y * v + z * w) / square, -half), half)
+    return a, b, c, d, e, f, x + far * u, y + far * v, z + far * w
+
+
 class PlacedHands:
     """n hands of one model at their holds, not yet closed.
 
@@ -108,12 +170,15 @@ class PlacedHands:
         # fingers that are alike but for rounding are alike: lengths in metres have 15 digits
         seen = (self.frames.rows @ there).round(15)
         self._seen: list[list[list[float]]] = (seen * swept[:, None, :3]).tolist()
+        across = (self.frames.across[:, :, 0] @ rotations).round(15)
+        self._across: list[list[list[float]]] = (across * swept[:, None, :3]).tolist()
+        self._alike = [
+            [] if shape is None else alike_across(shape, each).tolist()
+            for shape, each in zip(self._shapes, across, strict=True)
+        ]
 
-    def cuts(self, index: int) -> tuple[Swept, list[FingerPlane]] | None:
-        """Return a smooth hold's shape and the planes of a hand's fingers; None on other rock.
-
-        `cut_of` computes the rock in each finger's plane from both. Planes are equal for fingers
-        that are mirror images of each other, so that each rock section is computed once.
+    def cuts(self, index: int) -> SmoothCuts | None:
+        """Return a smooth hold's shape and the cuts through it of a hand; None on other rock.
 
         Parameters
         ----------
@@ -123,17 +188,20 @@ class PlacedHands:
         shape, rows = self._shapes[index], self._seen[index]
         if shape is None:
             return None
-        into = rows[STACK_ROWS.into]
-        planes: list[FingerPlane] = []
-        for origin, along in zip(rows[STACK_ROWS.joints], rows[STACK_ROWS.alongs], strict=True):
-            (a, b, c), (d, e, f), (x, y, z) = along, into, origin
-            # every swept hold is its own mirror image in x and in y
-            if (a or d or x) < 0.0:
-                a, d, x = -a, -d, -x
-            if (b or e or y) < 0.0:
-                b, e, y = -b, -e, -y
-            planes.append((a, b, c, d, e, f, x, y, z))
-        return shape, planes
+        alike, into = self._alike[index], rows[STACK_ROWS.into]
+        found = [
+            _cut(origin, along, into, across)
+            for origin, along, across in zip(
+                rows[STACK_ROWS.joints], rows[STACK_ROWS.alongs], self._across[index], strict=True
+            )
+        ]
+        keys, sides = zip(*found, strict=True)
+        half = 0.5 * self.hand.finger.tile_width
+        planes = [
+            plane if same else _nearest_plane(plane, across, half)
+            for same, (plane, across) in zip(alike, keys, strict=True)
+        ]
+        return SmoothCuts(shape, keys, sides, planes, alike)
 
     @cached_property
     def gaps(self) -> list[list[float]]:
@@ -144,7 +212,9 @@ class PlacedHands:
         """
         tiles, into = STACK_ROWS.tiles, STACK_ROWS.into
         return [
-            self._gaps_on(i) if shape is None else entry_distances(shape, seen[tiles], seen[into])
+            self._gaps_on(i)
+            if shape is None
+            else entry_distances(shape, seen[tiles], seen[into]).tolist()
             for i, (shape, seen) in enumerate(zip(self._shapes, self._seen, strict=True))
         ]
 

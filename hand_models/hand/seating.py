@@ -1,8 +1,8 @@
 """Find a seat for a hand on a hold: the hold's pose in the hand frame H, if none is given.
 
 Axes of the hold are parallel to H's. The proximal tiles of the inner fingers touch at
-``seated_contact`` (c₁) from their joints: of the hold's place (x, z) in H one number is given by
-the grasp, and the other follows.
+``seated_contact`` (c₁) from their joints, where they first meet the rock across their width: of the
+hold's place (x, z) in H one number is given by the grasp, and the other follows.
 
 - In a *pinch* the crest is midway between the opposed finger bases, and the palm's stand-off z
   follows.
@@ -116,7 +116,7 @@ def propose(
         ``hand.seated_contact`` from their joints. If so, and `touches_seat` is False for the closed
         finger, the caller uses `CENTRED_SEATING` instead.
     """
-    _, y, z = hand.inner_place
+    z = hand.inner_place[2]
     if at is not None:
         key = hold, at.position.tobytes(), at.rotation.tobytes()
         known = {} if known is None else known
@@ -128,7 +128,7 @@ def propose(
         return Seating(_shifted(0.0, z + hand.finger.tile_height), "flat"), False
     pinch = grasp.pinch
     crest = hand.pinch_crest if pinch else None
-    circle = hold.crest_circle(y)
+    circle = hold.crest_circle(_nearest_side(hand))
     if circle is None and hold.swept is None:
         return _on_outline(hand, RockUnder(hand, hold, Pose.identity()), crest), False
     place = _smooth(hand, hold, crest) if circle is None else _round(hand, *circle, crest)
@@ -138,6 +138,14 @@ def propose(
     if not possible:
         return CENTRED_SEATING, False
     return Seating(_shifted(*place), "pinch" if pinch else "palm_on_rock"), True
+
+
+def _nearest_side(hand: HandModel) -> float:
+    """Return how far from the palm's middle the tiles of inner fingers begin, along y [m].
+
+    There they first meet a crest that is under the palm's middle.
+    """
+    return max(abs(hand.inner_place[1]) - 0.5 * hand.finger.tile_width, 0.0)
 
 
 def touches_seat(hand: HandModel, along: float) -> bool:
@@ -168,7 +176,8 @@ def _round(hand: HandModel, depth: float, radius: float, crest: float | None) ->
 
 def _smooth(hand: HandModel, hold: Hold, crest: float | None) -> Place | None:
     """Do the same for a smooth hold that is not round, over the proximal phalanx's angle."""
-    x, y, z = hand.inner_joint.tolist()
+    x, _, z = hand.inner_joint.tolist()
+    y = _nearest_side(hand)
 
     def place(angle: Angle) -> tuple[Angle, Angle] | None:
         point = hold.tangent_point(y, angle)
@@ -222,7 +231,8 @@ class RockUnder:
         y = hand.inner_place[1]
         across = np.abs(hand.palm_tiles[:, 1]).max() + 0.5 * hand.palm_tile_size[1]
         self.under = self._outlines(
-            hold.finger_rock(*self._plane(each), tiles_only=True).tile for each in (y, -y)
+            hold.finger_rock(*self._plane(each), hand.finger.size, tiles_only=True).tile
+            for each in (y, -y)
         )
         # lines along the palm on which the highest rock under it is looked for
         lines = np.linspace(-across, across, 5).tolist() if self.under else []

@@ -279,11 +279,10 @@ def _laid(placed: PlacedHands, which: Iterable[int]) -> list[list[list[ClosedPha
         if cuts is None:
             laid.append([[] for _ in FINGERS])
             continue
-        shape, planes = cuts
-        found: dict[FingerPlane, list[ClosedPhalanx]] = {}
-        for plane in planes:
+        found: dict[FingerPlane | None, list[ClosedPhalanx]] = {}
+        for plane in cuts.planes:
             if plane not in found:
-                cut = cut_of(shape, plane)
+                cut = None if plane is None else cut_of(cuts.shape, plane)
                 found[plane] = [] if cut is None else placed.hand.sequential_closure.lay(cut)
-        laid.append([found[plane] for plane in planes])
+        laid.append([found[plane] for plane in cuts.planes])
     return laid

@@ -274,38 +274,31 @@ def line_depths(lines: Array, envelope: Array, s: Array, ends: Array) -> Array:
     return found
 
 
-@compiled("f2", "i1", "f1", "f2", "f0")
-def depths_behind(points: Array, stops: Indices, s: Array, depths: Array, least: float) -> Array:
+@compiled("f2", "f1", "f2")
+def depths_behind(points: Array, s: Array, depths: Array) -> Array:
     """Return how far rock on k lines along a finger lies behind an envelope, at n points of it.
 
     Parameters
     ----------
-    points, stops : ndarray
-        Points (s, t) of the envelope's smoothed outlines [m], and the index at which each ends.
+    points : ndarray, shape (n, 2)
+        Points (s, t) of the envelope's smoothed outlines [m].
     s : ndarray, shape (g,)
         Places in equal steps, ascending [m].
     depths : ndarray, shape (k, g)
         How far the rock on each line is behind the envelope along t; infinite without rock [m].
-    least : float
-        Least cosine of the angle between t and the outlines' normals.
 
     Returns
     -------
     ndarray, shape (n, k)
-        Depths along the outlines' normals; infinite without rock [m].
+        Depths along t; infinite without rock [m].
     """
-    behind, begin = np.full((len(points), len(depths)), math.inf), 0
-    for stop in stops:
-        for i in range(begin, stop):
-            a, b = points[max(i - 1, begin)], points[min(i + 1, stop - 1)]
-            along, into = b[0] - a[0], b[1] - a[1]
-            upright = max(along / math.sqrt(along * along + into * into), least)
-            place = (points[i, 0] - s[0]) / (s[1] - s[0])
-            at = min(max(int(place), 0), len(s) - 2)
-            for k in range(len(depths)):
-                depth = depths[k, at]
-                depth += (place - at) * (depths[k, at + 1] - depth)
-                if np.isfinite(depth):
-                    behind[i, k] = depth * upright
-        begin = stop
+    behind = np.full((len(points), len(depths)), math.inf)
+    for i in range(len(points)):
+        place = (points[i, 0] - s[0]) / (s[1] - s[0])
+        at = min(max(int(place), 0), len(s) - 2)
+        for k in range(len(depths)):
+            depth = depths[k, at]
+            depth += (place - at) * (depths[k, at + 1] - depth)
+            if np.isfinite(depth):
+                behind[i, k] = depth
     return behind

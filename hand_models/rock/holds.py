@@ -20,10 +20,13 @@ from hand_models.rock.surface import Triangles, drawn_out, grid
 from hand_models.sections import (
     SECTION_SETTINGS,
     FingerRock,
+    FingerSize,
     Section,
     Swept,
+    alike_across,
     cut_of,
     entry_distances,
+    rock_across,
 )
 
 __all__ = ["Cylinder", "Edge", "Ellipsoid", "Hold", "Plane", "Section", "Sphere"]
@@ -98,11 +101,24 @@ class Hold(ABC):
         return self.section(origin, s_axis, t_axis)
 
     def finger_rock(
-        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike, *, tiles_only: bool = False
+        self,
+        origin: ArrayLike,
+        s_axis: ArrayLike,
+        t_axis: ArrayLike,
+        size: FingerSize,
+        *,
+        tiles_only: bool = False,
     ) -> FingerRock:
         """Return the rock that a finger meets with its width, in its plane; in this class alike.
 
-        Arguments are those of `section`; ``tiles_only`` leaves out rock beside tiles, and strips.
+        Parameters
+        ----------
+        origin, s_axis, t_axis
+            The finger's plane, as of `section`.
+        size : FingerSize
+            Widths of the finger.
+        tiles_only : bool, optional
+            True to leave out the rock beside the tiles, and the strips across them.
         """
         return FingerRock(self.section(origin, s_axis, t_axis))
 
@@ -213,9 +229,27 @@ class SweptHold(Hold):
         )
         return cut_of(self.swept, plane)
 
+    def finger_rock(
+        self,
+        origin: ArrayLike,
+        s_axis: ArrayLike,
+        t_axis: ArrayLike,
+        size: FingerSize,
+        *,
+        tiles_only: bool = False,
+    ) -> FingerRock:
+        """Return the rock that a finger meets with its width: all beside its plane that it reaches.
+
+        Arguments are those of `Hold.finger_rock`.
+        """
+        plane = np.array([origin, s_axis, t_axis], dtype=float)
+        if alike_across(self.swept, np.cross(plane[2], plane[1])):
+            return FingerRock(self.section(origin, s_axis, t_axis))
+        return rock_across(self.swept, plane, size, tiles_only=tiles_only)
+
     def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
-        places = [self._scaled(point, self.swept.depth)]
-        return entry_distances(self.swept, places, self._scaled(direction))[0]
+        place = self._scaled(point, self.swept.depth)
+        return float(entry_distances(self.swept, place, self._scaled(direction)))
 
     def surface(self, low: Array, high: Array) -> Triangles:
         middle, reach = 0.5 * (low + high), 0.5 * float((high - low).max())

@@ -30,6 +30,7 @@ from hand_models.rock.triangles import (
     without_spikes,
     wound_alike,
 )
+from hand_models.sections import FingerSize
 
 __all__ = ["Mesh"]
 
@@ -168,9 +169,9 @@ class Mesh(OutlinedHold):
         pieces = cut(self.triangles, o, s, t, self._scale.reach, self._near(plane, 0.0))
         return bridge(pieces, self._scale.bridged_gap)
 
-    def _heights(self, plane: Array) -> Heights:
-        near = self._near(plane, 0.5 * self._scale.frame_width)
-        return self._heights_of(self.triangles, near, plane)
+    def _heights(self, plane: Array, size: FingerSize) -> Heights:
+        near = self._near(plane, 0.5 * size.frame_width)
+        return self._heights_of(self.triangles, near, plane, size)
 
     def _near(self, plane: Array, half: float) -> Indices:
         """Return the triangles within reach of a plane's origin and so far from the plane [m]."""

@@ -23,7 +23,7 @@ from hand_models.base import BASE_TOLERANCES, Array, InvalidInputError
 from hand_models.parameters import ParameterTable, hand_table, scan_table
 from hand_models.rock.smoothing import Heights, OutlinedHold, Scale
 from hand_models.rock.surface import Triangles, drawn_out
-from hand_models.sections import SECTION_SETTINGS
+from hand_models.sections import SECTION_SETTINGS, FingerSize
 
 __all__ = ["STRIP_NAMES", "Profile"]
 
@@ -110,16 +110,15 @@ class Profile(OutlinedHold):
         pieces = np.linalg.solve(M, (outline - o[[0, 2]]).T).T
         return [pieces if determinant > 0.0 else pieces[::-1]]
 
-    def _heights(self, plane: Array) -> Heights | None:
+    def _heights(self, plane: Array, size: FingerSize) -> Heights | None:
         """Return heights of the outline under the finger, extruded as far as it reaches."""
         o, s, t = plane
         across = np.cross(t, s)
         if np.hypot(*across[[0, 2]]) < BASE_TOLERANCES.relative:
             return None
-        scale = self._scale
-        end = 2.0 * scale.reach + scale.frame_width
+        end = 2.0 * self._scale.reach + size.frame_width
         drawn = drawn_out(self._outline(float(o[1])), o[1] - end, o[1] + end)
-        return self._heights_of(drawn, np.arange(len(drawn.faces)), plane)
+        return self._heights_of(drawn, np.arange(len(drawn.faces)), plane, size)
 
     def _along_axis(self, o: Array, s: Array, t: Array) -> list[Array]:
         """Return the straight rock in a plane that holds the direction of drawing."""

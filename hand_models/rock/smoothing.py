@@ -29,13 +29,14 @@ import scipy
 from numpy.typing import ArrayLike
 
 from hand_models.base import BASE_TOLERANCES, Array, Indices, InvalidInputError
-from hand_models.parameters import ParameterTable, check_widths, hand_table, scan_table
+from hand_models.parameters import ParameterTable, hand_table, scan_table
 from hand_models.rock.holds import Hold
 from hand_models.rock.surface import Triangles
 from hand_models.rock.triangles import unstrung
 from hand_models.sections import (
     NO_STRIPS,
     FingerRock,
+    FingerSize,
     PolylineSection,
     RockStrips,
     Section,
@@ -61,10 +62,6 @@ class Scale:
         Half the side of the square about a finger's base outside which rock is left out.
     longest : float
         Length of the rock's outline within that square above which the rock is refused.
-    tile_width, frame_width : float
-        Widths of a finger's tiles and of its phalanges' frames.
-    strip : float
-        Largest width of the strips across a tile in which its spines reach the rock or not.
     height_spacing : float
         Distance of places along a finger at which heights of rock are taken.
     """
@@ -74,9 +71,6 @@ class Scale:
     bridged_gap: float
     reach: float
     longest: float
-    tile_width: float
-    frame_width: float
-    strip: float
     height_spacing: float
 
     @classmethod
@@ -90,14 +84,8 @@ class Scale:
         ----------
         hand : ParameterTable, optional
             All parameters of the hand; the bundled ones by default.
-
-        Raises
-        ------
-        InvalidInputError
-            If the hand's tiles are wider than its frames.
         """
         hand, table = hand or hand_table(), scan_table()
-        check_widths(hand)
         usual = table.scalar("cut", "reach")
         reach = max(
             usual,
@@ -112,17 +100,8 @@ class Scale:
             bridged_gap=table.scalar("cut", "bridged_gap"),
             reach=reach,
             longest=table.scalar("cut", "longest") * (reach / usual),
-            tile_width=hand.scalar("finger", "tile_width"),
-            frame_width=hand.scalar("finger", "frame_width"),
-            strip=table.scalar("cut", "strip"),
             height_spacing=table.scalar("cut", "height_spacing"),
         )
-
-    @property
-    def lines(self) -> Array:
-        """Distance of the middle of each strip across a tile from the tile's middle, (k,) [m]."""
-        half = math.ceil(0.5 * self.tile_width / self.strip - 0.5)
-        return np.asarray(self.tile_width / (2 * half + 1) * np.arange(-half, half + 1))
 
     @property
     def places(self) -> Array:
@@ -232,7 +211,9 @@ class Heights(NamedTuple):
     line_ends: Array
 
 
-def _strips(scale: Scale, heights: Heights, section: PolylineSection | None) -> RockStrips:
+def _strips(
+    scale: Scale, strips: Array, heights: Heights, section: PolylineSection | None
+) -> RockStrips:
     """Return how far the rock of each strip under a finger's tiles lies behind their envelope."""
     from hand_models.rock.compiled_heights import depths_behind, line_depths
 
@@ -242,9 +223,10 @@ def _strips(scale: Scale, heights: Heights, section: PolylineSection | None) -> 
         depths = np.maximum(heights.lines - heights.tile, 0.0)
     else:
         depths = line_depths(heights.lines, heights.tile, scale.places, heights.line_ends)
-    points, stops = strung(section.pieces)
-    behind = depths_behind(points, stops, scale.places, depths, BASE_TOLERANCES.angle)
-    return RockStrips(scale.lines, points.view(complex)[:, 0], behind)
+    points, _ = strung(section.pieces)
+    places = points.view(complex)[:, 0]
+    behind = depths_behind(points, scale.places, depths)
+    return RockStrips(strips, places, np.full_like(places, 1j), behind)
 
 
 class OutlinedHold(Hold):
@@ -264,7 +246,13 @@ class OutlinedHold(Hold):
         self._scale = Scale.of(hand)
 
     def finger_rock(
-        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike, *, tiles_only: bool = False
+        self,
+        origin: ArrayLike,
+        s_axis: ArrayLike,
+        t_axis: ArrayLike,
+        size: FingerSize,
+        *,
+        tiles_only: bool = False,
     ) -> FingerRock:
         """Return the envelope of the rock across a finger's width, in the finger's plane, smoothed.
 
@@ -285,6 +273,7 @@ class OutlinedHold(Hold):
         from hand_models.rock.compiled_outlines import (
             least_heights,
             raised_outlines,
+            reached,
             seen_corners,
             seen_outlines,
         )
@@ -292,8 +281,12 @@ class OutlinedHold(Hold):
         scale, slack = self._scale, BASE_TOLERANCES.length
         middle = _reached(self._pieces(origin, s_axis, t_axis), scale)
         points, stops, hidden = seen_outlines(*strung(middle)) if middle else _no_outlines()
+        if hidden > scale.bridged_gap:
+            # what the finger reaches of it
+            near, ends, _ = reached(*strung(middle), size.reach)
+            _, _, hidden = seen_outlines(near, ends)
         plane = np.array([origin, s_axis, t_axis], dtype=float)
-        heights = self._heights(plane) if hidden <= scale.bridged_gap else None
+        heights = self._heights(plane, size) if hidden <= scale.bridged_gap else None
         if heights is None:
             return FingerRock(self._smooth(middle))
         s, corners = scale.places, seen_corners(points, stops, slack)
@@ -310,7 +303,7 @@ class OutlinedHold(Hold):
         if tiles_only:
             return FingerRock(tile)
         frame = envelope(heights.frame, heights.frame_ends)
-        return FingerRock(tile, frame, _strips(scale, heights, tile))
+        return FingerRock(tile, frame, _strips(scale, size.strips, heights, tile))
 
     def _smooth(self, runs: Sequence[Array]) -> PolylineSection | None:
         curves = [smooth(run, self._scale) for run in runs]
@@ -318,21 +311,23 @@ class OutlinedHold(Hold):
         return PolylineSection(reached) if reached else None
 
     @abstractmethod
-    def _heights(self, plane: Array) -> Heights | None:
+    def _heights(self, plane: Array, size: FingerSize) -> Heights | None:
         """Return heights of rock across a finger; None if the rock is alike across it.
 
         ``plane``: origin [m] and axes s and t of the finger's plane, shape (3, 3).
         """
 
-    def _heights_of(self, triangles: Triangles, some: Indices, plane: Array) -> Heights:
+    def _heights_of(
+        self, triangles: Triangles, some: Indices, plane: Array, size: FingerSize
+    ) -> Heights:
         """Return heights of some triangles across a finger."""
         from hand_models.rock.compiled_heights import facing_triangles, heights_across, rock_ends
 
         scale, s = self._scale, self._scale.places
-        halves = 0.5 * np.array([scale.tile_width, scale.frame_width])
+        halves, strips = 0.5 * np.array([size.tile_width, size.frame_width]), size.strips
         seen = facing_triangles(*triangles, some, plane, float(halves.max()), scale.reach)
-        least = heights_across(seen, s, halves, scale.lines, BASE_TOLERANCES.length)
-        slabs = np.concatenate([np.outer(halves, [-1.0, 1.0]), scale.lines[:, None].repeat(2, 1)])
+        least = heights_across(seen, s, halves, strips, BASE_TOLERANCES.length)
+        slabs = np.concatenate([np.outer(halves, [-1.0, 1.0]), strips[:, None].repeat(2, 1)])
         ends = np.full((len(least), 2, len(s), 2), np.nan)
         if not np.isfinite(least).all():
             ends = rock_ends(seen, s, slabs, least, scale.bridged_gap)

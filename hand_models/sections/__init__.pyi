@@ -2,6 +2,7 @@ from .boundary import strung as strung
 from .finger_rock import (
     NO_STRIPS as NO_STRIPS,
     FingerRock as FingerRock,
+    FingerSize as FingerSize,
     RockStrips as RockStrips,
 )
 from .outlines import Outlines as Outlines
@@ -22,3 +23,4 @@ from .swept_cuts import (
     cut_of as cut_of,
     entry_distances as entry_distances,
 )
+from .swept_envelopes import alike_across as alike_across, rock_across as rock_across

@@ -35,7 +35,7 @@ class Outlines(NamedTuple):
         Largest of the lengths in each block [m].
     bare : ndarray of bool, shape (n, p)
         True for rock that the bare frame meets, beside the tiles, and for what fills up.
-    places, behind, across : ndarray, shapes (n, c), (n, c, k) and (n, k)
+    places, ways, behind, across : ndarray, shapes (n, c), (n, c), (n, c, k) and (n, k)
         Rock in the strips across each finger's tiles, as in `RockStrips`.
     """
 
@@ -46,6 +46,7 @@ class Outlines(NamedTuple):
     longest: Array
     bare: Flags
     places: Complexes
+    ways: Complexes
     behind: Array
     across: Array
 
@@ -77,16 +78,21 @@ class Outlines(NamedTuple):
         strips = [rock.strips for rock in rocks]
         k = max(len(each.across) for each in strips)
         places = np.full((len(rocks), max([1, *(len(each.places) for each in strips)])), 1e3 + 0j)
-        behind, across = np.zeros((*places.shape, k)), np.zeros((len(rocks), k))
+        ways, behind, across = (
+            np.ones_like(places),
+            np.zeros((*places.shape, k)),
+            np.zeros((len(rocks), k)),
+        )
         for i, each in enumerate(strips):
             there = slice(len(each.places))
-            places[i, there], behind[i, there] = each.places, each.behind
+            places[i, there], ways[i, there] = each.places, each.ways
+            behind[i, there] = each.behind
             across[i] = each.across
         in_blocks = points.reshape(len(taken), blocks, block)
         centres = in_blocks.mean(axis=-1)
         radii = np.abs(in_blocks - centres[..., None]).max(axis=-1)
         longest = lengths.reshape(in_blocks.shape).max(axis=-1)
-        return cls(points, lengths, centres, radii, longest, bare, places, behind, across)
+        return cls(points, lengths, centres, radii, longest, bare, places, ways, behind, across)
 
 
 def _points(section: Section | None, reach: float, spacing: float) -> tuple[Complexes, Array]:

@@ -11,6 +11,7 @@ the rock.
 
 from __future__ import annotations
 
+import cmath
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 from hand_models.base import Array
 from hand_models.sections.settings import SECTION_SETTINGS
 
-__all__ = ["Complexes", "Face", "Flags", "Rest", "Section", "Vector2"]
+__all__ = ["Complexes", "Face", "Flags", "Rest", "Section", "Turned", "Vector2"]
 
 Vector2 = tuple[float, float]
 
@@ -70,8 +71,22 @@ class Rest(NamedTuple):
     flat: bool = False
 
 
+Turned = tuple[float, complex, float, bool]
+"""Angle by which a phalanx turns until its face rests [rad], the phalanx's direction, the contact's
+distance along it [m], and True if the face lies flat.
+"""
+
+
 class Section(ABC):
-    """The rock in a finger's plane: s along the finger, t into the rock; base class of sections."""
+    """The rock in a finger's plane: s along the finger, t into the rock; base class of sections.
+
+    Attributes
+    ----------
+    skew : bool
+        True if the plane is nearly parallel to the axis of the shape that it cuts.
+    """
+
+    skew = False
 
     @abstractmethod
     def outline(self, reach: float, spacing: float) -> Sequence[Complexes]:
@@ -110,6 +125,44 @@ class Section(ABC):
         Rest or None
             None if the face meets no rock up to ``high``.
         """
+
+    def turned(self, joint: complex, face: Face, low: complex, span: float) -> Turned | None:
+        """Return the first contact of a face as its phalanx turns from ``low`` by up to ``span``.
+
+        Parameters
+        ----------
+        joint : complex
+            Joint about which the phalanx turns [m].
+        face : Face
+        low : complex
+            Direction of the phalanx at the start, of length one.
+        span : float
+            Largest angle of turning [rad].
+
+        Returns
+        -------
+        tuple of (float, complex, float, bool), or None
+            Angle turned [rad], the phalanx's direction, the contact's distance along it [m], and
+            True if the face lies flat; None if the face meets no rock.
+        """
+        start = cmath.phase(low)
+        found = self.rest(joint, face, start, start + span)
+        if found is None:
+            return None
+        return found.angle - start, cmath.rect(1.0, found.angle), found.distance, found.flat
+
+    def clear(self, joint: complex, u: complex, face: Face) -> bool:
+        """Return True if the face of a phalanx does not touch the rock.
+
+        Parameters
+        ----------
+        joint : complex
+            Joint of the phalanx, s + i t [m].
+        u : complex
+            Unit direction of the phalanx.
+        face : Face
+        """
+        return self.face_clearance(joint, u, face) > 0.0
 
     def clearance(self, point: Vector2) -> float:
         """Return the approximate signed distance of (s, t) from the rock, negative inside [m]."""

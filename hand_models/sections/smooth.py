@@ -21,18 +21,13 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from hand_models.sections.section import Complexes, Face, Rest, Section
+from hand_models.sections.section import Complexes, Face, Rest, Section, Turned
 
 __all__ = ["Disc", "SmoothSection", "Wall", "into_circle", "past_circle", "to_face"]
 
 Tangent = tuple[complex, float]
 """Direction of a phalanx whose face's line touches the rock, and the contact's distance along the
 phalanx [m].
-"""
-
-Turned = tuple[float, complex, float, bool]
-"""Angle by which a phalanx turns until its face rests [rad], the phalanx's direction, the contact's
-distance along it [m], and True if the face lies flat.
 """
 
 
@@ -43,12 +38,9 @@ class SmoothSection(Section):
     ----------
     faced : bool
         True if the rock has flat faces.
-    skew : bool
-        True if the plane is nearly parallel to the axis of the shape that it cuts.
     """
 
     faced = False
-    skew = False
 
     @abstractmethod
     def tangent(self, joint: complex, height: float) -> Tangent | None:
@@ -105,19 +97,9 @@ class SmoothSection(Section):
         return iter(())
 
     def clear(self, joint: complex, u: complex, face: Face) -> bool:
-        """Return True if the face of a phalanx does not touch the rock.
-
-        Parameters
-        ----------
-        joint : complex
-            Joint of the phalanx, s + i t [m].
-        u : complex
-            Unit direction of the phalanx.
-        face : Face
-        """
         for _ in self.partings(joint, u, face):
             return True
-        return self.face_clearance(joint, u, face) > 0.0
+        return super().clear(joint, u, face)
 
     def straight(self, point: complex) -> bool:
         """Return True if the rock beside a point s + i t is flat: a face may lie flat there."""
@@ -128,24 +110,6 @@ class SmoothSection(Section):
         return None if found is None else Rest(low + found[0], found[2], found[3])
 
     def turned(self, joint: complex, face: Face, low: complex, span: float) -> Turned | None:
-        """Return the first contact of a face as its phalanx turns from ``low`` by up to ``span``.
-
-        Parameters
-        ----------
-        joint : complex
-            Joint about which the phalanx turns [m].
-        face : Face
-        low : complex
-            Direction of the phalanx at the start, of length one.
-        span : float
-            Largest angle of turning [rad].
-
-        Returns
-        -------
-        tuple of (float, complex, float, bool), or None
-            Angle turned [rad], the phalanx's direction, the contact's distance along it [m], and
-            True if the face lies flat; None if the face meets no rock.
-        """
         tangent = self.tangent(joint, face.height)
         if tangent is not None:
             u, along = tangent

@@ -19,17 +19,15 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from hand_models.base import BASE_TOLERANCES
+from hand_models.base import BASE_TOLERANCES, Array
 from hand_models.sections.ellipses import Ellipse, arc, radii, rock_left
 from hand_models.sections.section import Complexes, Face
 from hand_models.sections.settings import SECTION_SETTINGS
 from hand_models.sections.smooth import Disc, SmoothSection, Tangent, Wall
 
 __all__ = ["FingerPlane", "Swept", "cut_of", "entry_distances"]
-
-Vector3 = Sequence[float]
-"""Three numbers."""
 
 FingerPlane = tuple[float, float, float, float, float, float, float, float, float]
 """Nine numbers: axes of a finger's plane, along the finger and into the rock, and its origin from
@@ -64,56 +62,42 @@ class Swept(NamedTuple):
     grazing: float = 0.0
 
 
-def entry_distances(shape: Swept, points: Sequence[Vector3], direction: Vector3) -> list[float]:
-    """Cast rays: return the distance from each point, along one direction, at which rock begins.
+def entry_distances(shape: Swept, points: ArrayLike, directions: ArrayLike) -> Array:
+    """Cast rays: return the distance from each point, along its direction, at which rock begins.
 
     Parameters
     ----------
     shape : Swept
         The hold.
-    points : sequence of (float, float, float)
+    points : array_like, shape (..., 3)
         x, y, z from the ball's centre (0, 0, ``shape.depth``) in the hold's frame [m], each times
         the scale of its axis (``shape.scale_x``, …).
-    direction : (float, float, float)
-        x, y, z of a unit vector in the hold's frame, scaled likewise.
+    directions : array_like, shape (..., 3)
+        x, y, z of unit vectors in the hold's frame, scaled likewise; the shapes broadcast.
 
     Returns
     -------
-    list of float
+    ndarray, shape (...)
         Distance from each point, in metres of the hold's frame. Negative if the rock begins behind
         the point, as for a point inside the rock; infinite if the ray's line misses the rock.
     """
-    dx, dy, dz = direction
-    a = dx * dx + dy * dy + dz * dz
+    x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+    dx, dy, dz = np.moveaxis(np.asarray(directions, dtype=float), -1, 0)
+    a, b = dx * dx + dy * dy + dz * dz, x * dx + y * dy + z * dz
     radius = shape.radius
-    found = []
-    for x, y, z in points:
-        b = x * dx + y * dy + z * dz
-        discriminant = b * b - a * (x * x + y * y + z * z - radius * radius)
-        meets = discriminant >= 0.0 and radius > 0.0 and a > 0.0
-        found.append((-b - math.sqrt(discriminant)) / a if meets else math.inf)
+    discriminant = b * b - a * (x * x + y * y + z * z - radius * radius)
+    meets = (discriminant >= 0.0) & (a > 0.0) & (radius > 0.0)
+    near = -b - np.sqrt(np.where(meets, discriminant, 0.0))
+    found = np.where(meets, near / np.where(a > 0.0, a, 1.0), math.inf)
     if shape.sine:
-        faces = [_entries_of_face(shape, points, direction, side) for side in (1.0, -1.0)]
-        found = [min(each) for each in zip(found, *faces, strict=True)]
-    return found
-
-
-def _entries_of_face(
-    shape: Swept, points: Sequence[Vector3], direction: Vector3, side: float
-) -> list[float]:
-    """Do the same for the face of a hold on one side along x."""
-    dx, _, dz = direction
-    sine, cosine = shape.sine, side * shape.cosine
-    closing = cosine * dx - sine * dz
-    found = []
-    for x, _, z in points:
-        hit = math.inf
-        if closing < -shape.grazing:
-            hit = (shape.radius - cosine * x + sine * z) / closing
-            if side * sine * (x + hit * dx) + shape.cosine * (z + hit * dz) < 0.0:
-                hit = math.inf
-        found.append(hit)
-    return found
+        for side in (1.0, -1.0):
+            sine, cosine = shape.sine, side * shape.cosine
+            closing = cosine * dx - sine * dz
+            steep = closing < -shape.grazing
+            hit = (radius - cosine * x + sine * z) / np.where(steep, closing, 1.0)
+            ahead = side * sine * (x + hit * dx) + shape.cosine * (z + hit * dz)
+            found = np.minimum(found, np.where(steep & (ahead >= 0.0), hit, math.inf))
+    return np.asarray(found)
 
 
 def cut_of(shape: Swept, plane: FingerPlane) -> SmoothSection | None:
@@ -174,7 +158,7 @@ def cut_of(shape: Swept, plane: FingerPlane) -> SmoothSection | None:
 
 def _along_axis(shape: Swept, plane: FingerPlane) -> Wall | None:
     """Return the straight rock in a plane that holds the axis of an extrusion."""
-    depth = entry_distances(shape, [plane[6:]], plane[3:6])[0]
+    depth = float(entry_distances(shape, plane[6:], plane[3:6]))
     if not math.isfinite(depth):
         return None
     # where a vector of the plane is all but lost across the axis

@@ -12,7 +12,6 @@ from hand_models import Cylinder, Grasp, Pose, SettledHand
 from hand_models.finger.phalanx_shape import PhalanxShape
 from hand_models.hand import FINGERS
 from hand_models.rock import Mesh, Profile
-from hand_models.rock.smoothing import Scale
 from tests.suite.helpers.hands import HAND, ROCK, line_hand
 from tests.suite.helpers.rocks import fractal_wall, height_map, random_profile
 from tests.suite.helpers.shares import given_some
@@ -73,7 +72,7 @@ def test_no_rock_is_in_any_frame_of_two_hundred_hands() -> None:
 
 
 def test_strips_fill_the_width_evenly() -> None:
-    middles = Scale.of().lines
+    middles = HAND.finger.size.strips
     assert len(middles) % 2 == 1
     np.testing.assert_allclose(middles, -middles[::-1], atol=1e-15)
     np.testing.assert_allclose(np.diff(middles), TILE / len(middles))
@@ -87,8 +86,7 @@ def test_on_rock_that_is_alike_across_a_finger_nothing_changes(seed: int) -> Non
     names = ("outer_left", "inner_left", "inner_right", "outer_right")
     drawn = outlines[0] if len(outlines) == 1 else dict(zip(names, outlines, strict=True))
     one, other = (
-        HAND.settle_each([_placed(Profile(drawn, table), grasp, pose)])[0]
-        for table in (None, line_hand())
+        hand.settle_each([_placed(Profile(drawn), grasp, pose)])[0] for hand in (HAND, line_hand())
     )
     if not isinstance(one, SettledHand):
         assert str(one) == str(other)

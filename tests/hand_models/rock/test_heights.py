@@ -14,12 +14,14 @@ from hand_models.rock.compiled_heights import facing_triangles, heights_across, 
 from hand_models.rock.compiled_outlines import least_heights, raised_outlines, seen_outlines
 from hand_models.rock.surface import Triangles
 from hand_models.rock.triangles import weld
+from tests.suite.helpers.hands import HAND
 from tests.suite.helpers.rocks import fractal_wall
 from tests.suite.helpers.shares import given_some
 
 seeds = st.integers(0, 2**32 - 1)
 PLACES = np.linspace(-0.1, 0.1, 401)
 HALVES, LINES = np.array([0.010, 0.0145]), np.linspace(-0.009, 0.009, 7)
+SIZE = HAND.finger.size
 LEVEL = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
@@ -132,9 +134,9 @@ def sheet(low: float, high: float, z: float) -> tuple[np.ndarray, np.ndarray]:
 def test_rock_behind_other_rock_changes_nothing() -> None:
     front, faces = fractal_wall(2, size=0.4, count=61, height=0.004)
     behind = fractal_wall(3, size=0.4, count=61, height=0.004)[0] + [0.0, 0.0, 0.03]
-    alone = Mesh(front, faces, anywhere=True).finger_rock(*LEVEL)
+    alone = Mesh(front, faces, anywhere=True).finger_rock(*LEVEL, SIZE)
     both = Mesh(np.vstack([behind, front]), np.vstack([faces, faces + len(front)]), anywhere=True)
-    for one, other in zip(alone.sections, both.finger_rock(*LEVEL).sections, strict=True):
+    for one, other in zip(alone.sections, both.finger_rock(*LEVEL, SIZE).sections, strict=True):
         np.testing.assert_allclose(np.vstack(other.pieces), np.vstack(one.pieces), atol=1e-12)
 
 
@@ -145,7 +147,7 @@ def test_what_stands_out_beside_a_sliver_in_the_plane_is_met() -> None:
     ribs = [left + beside, left - beside]
     sliver = left * [5e-4, 5e-3, 0.0] + [0.0101, 0.0, 0.006]
     vertices, triangles = np.vstack([*ribs, sliver]), np.vstack([faces, faces + 4, faces + 8])
-    rock = Mesh(vertices, triangles, anywhere=True).finger_rock(*LEVEL)
+    rock = Mesh(vertices, triangles, anywhere=True).finger_rock(*LEVEL, SIZE)
     for section in rock.sections:
         np.testing.assert_allclose(np.vstack(section.pieces)[:, 1], 0.0, atol=1e-12)
 

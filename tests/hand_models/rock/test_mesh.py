@@ -15,7 +15,7 @@ from hand_models.rock import Mesh, Triangles, read_mesh, weld
 from hand_models.rock.smoothing import Scale, smooth
 from hand_models.rock.triangles import bridge, cut, without_spikes, wound_alike
 from hand_models.sections import PolylineSection
-from tests.suite.helpers.hands import HAND, ROCK, line_hand
+from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.rocks import (
     cylinder_mesh,
     distance,
@@ -50,7 +50,7 @@ def log(x, y, radius=0.15):
 @pytest.mark.parametrize("rotation", [0.0, 1.0, math.pi])
 def test_a_meshed_cylinder_is_the_cylinder(around, rotation):
     want = HAND.settle(Cylinder(0.3), ROCK, Grasp(rotation))
-    got = HAND.settle(Mesh(*cylinder_mesh(0.3, around), line_hand()), ROCK, Grasp(rotation))
+    got = HAND.settle(Mesh(*cylinder_mesh(0.3, around)), ROCK, Grasp(rotation))
     assert got.tiles == want.tiles
     assert got.palm.engaged == want.palm.engaged
     np.testing.assert_allclose(got.seating.pose.position, want.seating.pose.position, atol=1e-4)
@@ -73,7 +73,7 @@ def test_it_may_be_placed_anyhow(turn):
     tilt = Rotation.from_rotvec([0.05, -0.04, turn]).as_matrix()
     pose = Pose(np.array([0.01, 0.005, 0.004]), tilt)
     want = HAND.settle(Cylinder(0.3), ROCK, Grasp(0.7), pose)
-    got = HAND.settle(Mesh(*cylinder_mesh(0.3, 512, 2.0), line_hand()), ROCK, Grasp(0.7), pose)
+    got = HAND.settle(Mesh(*cylinder_mesh(0.3, 512, 2.0)), ROCK, Grasp(0.7), pose)
     np.testing.assert_allclose(got.positions, want.positions, atol=3e-4)
     np.testing.assert_allclose(got.palm.gaps, want.palm.gaps, atol=3e-5)
 

@@ -14,7 +14,7 @@ from scipy.optimize import lsq_linear
 from hand_models import Cylinder, Grasp, InvalidInputError, Plane
 from hand_models.rock import Profile
 from hand_models.rock.profile import STRIP_NAMES
-from tests.suite.helpers.hands import HAND, ROCK, line_hand
+from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.rocks import distance, random_axes, random_profile
 from tests.suite.helpers.shares import given_some
 
@@ -30,7 +30,7 @@ def arc(radius, count=600):
 @pytest.mark.parametrize("rotation", [0.0, 0.8, math.pi])
 def test_a_drawn_cylinder_is_the_cylinder(rotation):
     want = HAND.settle(Cylinder(0.3), ROCK, Grasp(rotation))
-    got = HAND.settle(Profile(arc(0.15), line_hand()), ROCK, Grasp(rotation))
+    got = HAND.settle(Profile(arc(0.15)), ROCK, Grasp(rotation))
     assert got.tiles == want.tiles
     assert got.seating.rule == want.seating.rule
     np.testing.assert_allclose(got.seating.pose.position, want.seating.pose.position, atol=1e-4)

@@ -53,11 +53,9 @@ def changed_hand(
     return SpinyHand(hand.table.replaced(ParameterTable(own)))
 
 
-def line_hand() -> ParameterTable:
-    """The parameters of a hand whose fingers have no width, as smooth shapes take them."""
-    return changed_hand(
-        "finger", "frame_width", 0.0, changed_hand("finger", "tile_width", 0.0)
-    ).table
+def line_hand() -> SpinyHand:
+    """A hand whose fingers have no width."""
+    return changed_hand("finger", "frame_width", 0.0, changed_hand("finger", "tile_width", 0.0))
 
 
 def entry_toml(section: str, name: str, value: Any, unit: str | None = None) -> str:
