@@ -55,11 +55,14 @@ class SlipFindings(NamedTuple):
         All tiles of the hands with data, the most probable first.
     suspects : tuple of LostTile
         The first of them, which have 95 % of the probability together.
+    reason : str or None
+        Why no slip is seen, one sentence; None if one is.
     """
 
     seen: bool
     tiles: tuple[SuspectTile, ...]
     suspects: tuple[LostTile, ...]
+    reason: str | None = None
 
 
 class _Shown(NamedTuple):
@@ -151,7 +154,7 @@ class SlipDiagnosis:
         )
         known = np.flatnonzero(np.isfinite(own))
         if not len(known):
-            return SlipFindings(False, (), ())
+            return SlipFindings(False, (), (), "no tile of the hands with data is on the rock")
         sticks = np.log([[1.0 - numbers["sticks"]], [numbers["sticks"]]])
         logs = np.logaddexp(*(gain[:, known] + sticks)) + self._before[known]
         shares = np.exp(logs - logs.max())
@@ -164,7 +167,30 @@ class SlipDiagnosis:
             for i, k in zip(order, known[order], strict=True)
         )
         seen = bool(gain[:, known].max() > 0.5 * numbers["seen"] ** 2)
-        return SlipFindings(seen, tiles, tuple(each.tile for each in tiles[:count]))
+        suspects = tuple(each.tile for each in tiles[:count])
+        reason = None if seen else self._unseen(own, shown, known, kind)
+        return SlipFindings(seen, tiles, suspects, reason)
+
+    def _unseen(self, own: Array, shown: _Shown, known: Array, kind: str) -> str:
+        """Say why no slip is seen: what is off most, and how many slips would not show."""
+        least = _numbers()["seen"]
+        off = (own - shown.rests) / shown.rest_errors
+        k = int(known[np.abs(off[known]).argmax()])
+        tile, unit = self.signatures[k].tile, "rad" if kind == "turns" else "N"
+        what = "turn of the winch" if kind == "turns" else "tension"
+        by = own[k] - shown.rests[k]
+        said = (
+            f"the {what} of {tile.limb} {tile.finger} is off most, by {by:+.2g} {unit}, "
+            f"{abs(off[k]):.2g} of its standard deviation"
+        )
+        if abs(off[k]) > least:
+            return f"{said}, which the slip of no tile explains; check data and set-points"
+        changes = np.abs(shown.meant[0] - shown.rests) / shown.errors[0]
+        hidden = int((changes[known] < least).sum())
+        return (
+            f"{said}, and a slip is seen from {least:g} of them; those of {hidden} of {len(known)} "
+            "tiles would show less"
+        )
 
     def ambiguous(self, *, held: bool) -> tuple[tuple[LostTile, LostTile], ...]:
         """Return pairs of tiles of a finger whose slips look alike: within twice the data's error.

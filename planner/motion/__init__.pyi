@@ -13,10 +13,10 @@ from .collisions import (
 from .compiled_capsules import capsule_distances as capsule_distances
 from .rocks import Rock as Rock, distances_from_rock as distances_from_rock, rocks_of as rocks_of
 from .settings import MOTION_SETTINGS as MOTION_SETTINGS, MotionSettings as MotionSettings
+from .shifts import check_shift as check_shift, met_in_shift as met_in_shift
 from .swings import (
     NoWayError as NoWayError,
     Swing as Swing,
-    check_shift as check_shift,
     clear_branches as clear_branches,
     swing as swing,
 )

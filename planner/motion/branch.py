@@ -33,25 +33,37 @@ class BranchEndError(InvalidInputError):
         What keeps the limb from going on.
     shifts : bool
         Whether the hand stays on its hold, and the body shifts.
+    few_joints : bool
+        Whether the limb has too few joints for the path, from whatever posture it starts.
 
     Attributes
     ----------
-    limb, share, lacks, shifts
+    limb, share, lacks, shifts, few_joints
         The parameters.
     """
 
     kind = "unreachable"
 
-    def __init__(self, limb: str, share: float, lacks: str, shifts: bool = False) -> None:
+    def __init__(
+        self,
+        limb: str,
+        share: float,
+        lacks: str,
+        *,
+        shifts: bool = False,
+        few_joints: bool = False,
+    ) -> None:
         percent = f"{100.0 * share:.0f} %"
-        super().__init__(
-            f"{limb} cannot keep its hold beyond {percent} of the body's shift: {lacks}; shift the "
-            "body less or elsewhere, or start from another posture"
-            if shifts
-            else f"{limb} cannot follow its hand's path beyond {percent} of it: {lacks}; start "
-            "from another posture, or choose another path"
-        )
-        self.limb, self.share, self.lacks, self.shifts = limb, share, lacks, shifts
+        if shifts:
+            what = f"{limb} cannot keep its hold beyond {percent} of the body's shift"
+            advice = "shift the body less or elsewhere"
+        else:
+            what = f"{limb} cannot follow its hand's path beyond {percent} of it"
+            advice = "choose another path"
+        other = "" if few_joints else ", or start from another posture"
+        super().__init__(f"{what}: {lacks}; {advice}{other}")
+        self.limb, self.share, self.lacks = limb, share, lacks
+        self.shifts, self.few_joints = shifts, few_joints
 
 
 def pose_between(first: Pose, second: Pose, part: float) -> Pose:
@@ -144,6 +156,16 @@ class _Limb:
         _, J = self.errors(angles, self._still)
         return 0.5 * float(np.linalg.slogdet(J @ J.T + 1e-12 * np.eye(6))[1])
 
+    def lacks_joints(self, angles: Array, pose: Pose) -> bool:
+        """Return whether a limb of few joints misses a pose, were there no limits of joints."""
+        if len(angles) >= 6:
+            return False
+        target = self.target(pose)
+        for _ in range(MOTION_SETTINGS.newton_steps):
+            error, J = self.errors(angles, target)
+            angles = angles + _least_step(J, error)
+        return bool(np.abs(self.errors(angles, target)[0]).max() > MOTION_SETTINGS.missed)
+
     def lacking(self, angles: Array, pose: Pose) -> str:
         """Say what keeps the limb from a pose, from the angles that it has."""
         chain, (error, J) = self.chain, self.errors(angles, self.target(pose))
@@ -155,7 +177,10 @@ class _Limb:
             limit = chain.lower[i] if low[i] else chain.upper[i]
             unit = "m" if chain.sliding[i] else "rad"
             stopped.append(f"{chain.joints[i]} is at its limit of {limit:.4g} {unit}")
-        if np.linalg.svd(J, compute_uv=False)[-1] < MOTION_SETTINGS.singular:
+        if self.lacks_joints(angles, pose):
+            count = len(angles)
+            stopped = [f"a limb of {count} joints moves its hand in {count} of 6 ways only"]
+        elif np.linalg.svd(J, compute_uv=False)[-1] < MOTION_SETTINGS.singular:
             stopped.append("the limb is stretched or folded, so its hand cannot move every way")
         if not stopped:
             step = MOTION_SETTINGS.largest_step
@@ -216,7 +241,8 @@ def follow_poses(robot: Robot, limb: str, start_angles: Array, poses: Sequence[P
                 step *= 0.5
                 if step < 0.5**MOTION_SETTINGS.finest:
                     share = (i + done) / len(poses)
-                    raise BranchEndError(limb, share, one.lacking(angles, pose))
+                    few = one.lacks_joints(angles, pose)
+                    raise BranchEndError(limb, share, one.lacking(angles, pose), few_joints=few)
                 continue
             angles, done = moved, part
             step *= 2.0
@@ -262,7 +288,9 @@ def shift_postures(
             for limb, hand in hands.items()
         }
     except BranchEndError as error:
-        raise BranchEndError(error.limb, error.share, error.lacks, shifts=True) from None
+        raise BranchEndError(
+            error.limb, error.share, error.lacks, shifts=True, few_joints=error.few_joints
+        ) from None
 
 
 def branches(

@@ -164,7 +164,7 @@ class JointSpace:
             [*([np.arange(len(scene.body))] if last else []), *(scene.own[limb] for limb in limbs)]
         )
         known = np.asarray(np.isfinite(self._still[:, 0, 0]))[scene.pairs].all(axis=1)
-        moves = np.isin(scene.pairs, np.concatenate([scene.own[limb] for limb in limbs]))
+        moves = np.isin(scene.pairs, [each for limb in limbs for each in scene.own[limb]])
         self._pairs = np.ascontiguousarray(scene.pairs[known & moves.any(axis=1)])
         self._spread_points()
         self._met = np.ones((len(scene.rocks), len(self._measured)), dtype=bool)

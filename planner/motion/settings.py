@@ -19,12 +19,18 @@ class MotionSettings:
     """Newton's steps from one pose to the next."""
     pose_error: float = 1e-11
     """Error of a pose that is followed, of the limb's reach [1] or [rad]."""
+    missed: float = 1e-6
+    """Error of a pose beyond which a limb of few joints misses it, of its reach [1] or [rad]."""
     at_limit: float = 1e-3
     """Distance of a joint from its limit at which it counts as there [rad]."""
     singular: float = 0.02
     """Least singular value of a hand's Jacobian over the reach at which it is singular [1]."""
     finest: int = 10
     """Times that a step between two poses is halved before a branch counts as ended."""
+    shift_steps: int = 8
+    """Parts of a body's shift at which what is met is looked for where a limb cannot follow."""
+    short_of: float = 0.98
+    """Part of the way to a branch's end up to which the limb is followed to look for it."""
     point_spacing: float = 0.03
     """Largest distance of the points along a capsule from which rock is measured [m]; what it
     leaves out is taken off the distance."""
@@ -45,6 +51,8 @@ class MotionSettings:
     """Bound of the motion between two postures that a search looks at [m]."""
     tries: int = 200
     """Directions in which a search grows, of each of its trees."""
+    first_tries: int = 40
+    """Of them, for each end of a way alone, the nearest first, before all ends at once."""
     shortcuts: int = 40
     """Pairs of places on a way found that a straight line is tried between."""
 

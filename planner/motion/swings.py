@@ -8,17 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError, Pose
 from planner.motion.branch import BranchEndError, branches, follow_poses
 from planner.motion.collisions import CollisionScene, JointSpace, NearestPair
-from planner.motion.ways import Clear, check_way, search_way
+from planner.motion.settings import MOTION_SETTINGS
+from planner.motion.ways import Clear, check_way, search_way, way_length
 from planner.robots import Robot, scene_number
 
-__all__ = ["NoWayError", "Swing", "check_shift", "clear_branches", "swing"]
+__all__ = ["NoWayError", "Swing", "clear_branches", "swing"]
 
 
 class NoWayError(InvalidInputError):
@@ -90,7 +91,7 @@ def swing(
     margin: float | None = None,
     seed: int = 0,
 ) -> Swing:
-    """Find the swing of a limb's hand from its hold to the next one, while all else stays.
+    """Find a short swing of a limb's hand from its hold to the next one, while all else stays.
 
     Parameters
     ----------
@@ -103,7 +104,8 @@ def swing(
     limb : str
         The limb that swings.
     goals : sequence of ndarray, shape (n,)
-        Joint angles with the hand on its new hold, the best ones first [rad].
+        Joint angles with the hand on its new hold [rad]. The swing ends at that of them to which
+        the shortest way in joint space was found.
     stand_off : float, optional
         Distance of the hand from its holds in the swing [m]; that of ``parameters/scene.toml`` by
         default.
@@ -142,28 +144,59 @@ def swing(
     back = leaving(start, "old")
     onto: list[Array] = []
     refused: list[BranchEndError | NoWayError] = []
-    blocked: list[NearestPair] = []
     for goal in goals:
         try:
             onto.append(leaving(np.asarray(goal, dtype=float), "new")[::-1])
         except (BranchEndError, NoWayError) as error:
             refused.append(error)
-            continue
-        line = np.array([back[-1], onto[-1][0]])
-        seen = check_way(free, line, margin)
-        if seen.clear:
-            return _joined(limb, back, line, onto[-1], seen, "straight")
-        blocked.append(seen.nearest)
-    if onto:
-        ends = np.array([each[0] for each in onto])
-        found = search_way(free, back[-1], ends, margin, seed)
-        if found is not None:
-            way, seen = found
-            which = int(np.abs(ends - way[-1]).max(axis=1).argmin())
-            return _joined(limb, back, way, onto[which], seen, "searched")
+    if not onto:
+        raise refused[0]
+    way = _shortest(free, back[-1], onto, margin, seed)
+    if isinstance(way, NearestPair):
         where = "on the straight way in joint space, around which none was found"
-        raise NoWayError(limb, where, blocked[0], margin)
-    raise refused[0]
+        raise NoWayError(limb, where, way, margin)
+    path = np.vstack([back, way.corners[1:], way.onto[1:]])
+    retreat = len(back) - 1
+    approach = retreat + len(way.corners) - 1
+    return Swing(limb, path, retreat, approach, way.seen.nearest, way.seen.bound, way.how)
+
+
+class _Way(NamedTuple):
+    """A way through the air, shape (m, n), and one of those onto the new hold, shape (k, n)."""
+
+    corners: Array
+    onto: Array
+    seen: Clear
+    how: Literal["straight", "searched"]
+
+
+def _shortest(
+    space: JointSpace, start: Array, onto: Sequence[Array], margin: float, seed: int
+) -> _Way | NearestPair:
+    """Return the shortest way found to the begin of one onto the new hold, or what is met."""
+    best, length, met = None, np.inf, None
+    # no way to an end is shorter than the straight one: the nearest end first
+    for end in sorted(onto, key=lambda each: float(np.linalg.norm(each[0] - start))):
+        line = np.array([start, end[0]])
+        if length <= way_length(line):
+            break
+        seen = check_way(space, line, margin)
+        if seen.clear:
+            best = _Way(line, end, seen, "straight")
+            break
+        met = met or seen.nearest
+        found = search_way(space, start, line[1:], margin, seed, MOTION_SETTINGS.first_tries)
+        if found is not None and way_length(found[0]) < length:
+            best, length = _Way(found[0], end, found[1], "searched"), way_length(found[0])
+    if best is not None:
+        return best
+    ends = np.array([each[0] for each in onto])
+    found = search_way(space, start, ends, margin, seed, MOTION_SETTINGS.tries)
+    if found is None:
+        assert met is not None  # on the way to the nearest end
+        return met
+    which = int(np.abs(ends - found[0][-1]).max(axis=1).argmin())
+    return _Way(found[0], onto[which], found[1], "searched")
 
 
 def _straight(robot: Robot, limb: str, angles: Array, stand_off: float) -> Array:
@@ -177,19 +210,6 @@ def _straight(robot: Robot, limb: str, angles: Array, stand_off: float) -> Array
 def _require(limb: str, seen: Clear, where: str, margin: float) -> None:
     if not seen.clear:
         raise NoWayError(limb, where, seen.nearest, margin)
-
-
-def _joined(
-    limb: str,
-    back: Array,
-    way: Array,
-    on: Array,
-    seen: Clear,
-    how: Literal["straight", "searched"],
-) -> Swing:
-    path = np.vstack([back, way[1:], on[1:]])
-    retreat = len(back) - 1
-    return Swing(limb, path, retreat, retreat + len(way) - 1, seen.nearest, seen.bound, how)
 
 
 def clear_branches(
@@ -237,35 +257,3 @@ def clear_branches(
         if held.clearances(angles[None], margin).min() >= margin:
             found.append(angles)
     return tuple(found)
-
-
-def check_shift(
-    scene: CollisionScene,
-    bodies: Sequence[Pose],
-    joints: Mapping[str, Array],
-    *,
-    margin: float | None = None,
-) -> Clear:
-    """Prove that the robot is clear while its body shifts on hands that stay, or find where not.
-
-    Parameters
-    ----------
-    scene : CollisionScene
-    bodies : sequence of Pose, length m, at least 2
-        Poses of B in W, from the first one on; between two of them position and joint angles change
-        linearly, and the orientation along the shortest turn.
-    joints : mapping of str to ndarray, shape (m, n)
-        Angles of the limbs' joints [rad]; a limb left out is not measured.
-    margin : float, optional
-        As of `swing`.
-
-    Raises
-    ------
-    DeadlineError
-        If the deadline passes first.
-    """
-    margin = scene_number("motion", "margin") if margin is None else margin
-    first = {limb: angles[0] for limb, angles in joints.items()}
-    space = JointSpace(scene, bodies, first, tuple(joints), touching=scene.robot.limbs)
-    progress = np.arange(float(len(bodies)))[:, None]
-    return check_way(space, np.hstack([*joints.values(), progress]), margin)

@@ -16,7 +16,7 @@ from planner import deadline
 from planner.motion.collisions import JointSpace, NearestPair
 from planner.motion.settings import MOTION_SETTINGS
 
-__all__ = ["Clear", "check_way", "search_way"]
+__all__ = ["Clear", "check_way", "search_way", "way_length"]
 
 
 class Clear(NamedTuple):
@@ -145,8 +145,13 @@ def _clear_part(space: JointSpace, start: Array, end: Array, margin: float) -> t
     return count, postures
 
 
+def way_length(way: Array) -> float:
+    """Return the length of a way of straight lines in joint space, shape (m, d) [rad]."""
+    return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+
+
 def search_way(
-    space: JointSpace, start: Array, goals: Array, margin: float, seed: int
+    space: JointSpace, start: Array, goals: Array, margin: float, seed: int, tries: int
 ) -> tuple[Array, Clear] | None:
     """Search a clear way from a posture to one of several, shortened by straight lines.
 
@@ -161,6 +166,8 @@ def search_way(
         Least distance at the postures that are looked at [m].
     seed : int
         Seed of the random directions.
+    tries : int
+        Number of directions in which a tree grows, at most.
 
     Returns
     -------
@@ -178,7 +185,7 @@ def search_way(
     trees = _Tree(start[None]), _Tree(goals)
     ends = np.vstack([start, goals])
     low, high = ends.min(axis=0), ends.max(axis=0)
-    tries, most = MOTION_SETTINGS.tries, np.pi
+    most = np.pi
     for k in range(tries):
         deadline.check("a limb's way to its new hold was found")
         # first about the ends, then everywhere

@@ -30,7 +30,9 @@ PHASE_COLOURS: Final = {
 }
 
 
-def write_report(result: RouteResult, folder: Path, climb: Climb | None = None) -> dict[str, Path]:
+def write_report(
+    result: RouteResult, folder: Path, climb: Climb | None = None, digest: str | None = None
+) -> dict[str, Path]:
     """Write ``stages.csv``, ``margin.png`` and ``summary.json`` into a folder.
 
     The margin of a stage is the cap on the utilisation minus the stage's utilisation.
@@ -44,6 +46,8 @@ def write_report(result: RouteResult, folder: Path, climb: Climb | None = None) 
     climb : Climb, optional
         Knots of the climb; with them ``climb.png`` shows the robot and its margins along the time,
         and ``support.png`` where the centre of mass may be and goes.
+    digest : str, optional
+        Digest of the file that has the climb's knots, for the summary.
 
     Returns
     -------
@@ -77,13 +81,15 @@ def write_report(result: RouteResult, folder: Path, climb: Climb | None = None) 
     for name, figure in pictures.items():
         with whole_file(files[name]) as part:
             figure.savefig(part, dpi=130, bbox_inches="tight", facecolor="white")
-    text = json.dumps(summary(result, climb), indent=2, ensure_ascii=False)
+    text = json.dumps(summary(result, climb, digest), indent=2, ensure_ascii=False)
     with whole_file(files["summary"]) as part:
         part.write_text(text + "\n", encoding="utf-8")
     return files
 
 
-def summary(result: RouteResult, climb: Climb | None = None) -> dict[str, Any]:
+def summary(
+    result: RouteResult, climb: Climb | None = None, digest: str | None = None
+) -> dict[str, Any]:
     """Return the summary of a climb: statuses, the crux (its hardest stage), warnings and findings.
 
     Parameters
@@ -92,6 +98,8 @@ def summary(result: RouteResult, climb: Climb | None = None) -> dict[str, Any]:
         Plans of all stages of the climb.
     climb : Climb, optional
         Knots of the climb; with them the summary has its moves, and why it fails.
+    digest : str, optional
+        Digest of the file that has the climb's knots.
 
     Returns
     -------
@@ -111,11 +119,11 @@ def summary(result: RouteResult, climb: Climb | None = None) -> dict[str, Any]:
         "crux": {**_row(stage, plan), "sentence": _sentence(stage, plan)},
         "warnings": list(_warnings(result)),
         "findings": list(_findings(result)),
-        **({} if climb is None else {"climb": _climb(climb)}),
+        **({} if climb is None else {"climb": _climb(climb, digest)}),
     }
 
 
-def _climb(climb: Climb) -> dict[str, Any]:
+def _climb(climb: Climb, digest: str | None) -> dict[str, Any]:
     """Return the moves of a climb, the start among them, and why it ends early."""
     failure = None if climb.failure is None else asdict(climb.failure)
     rows, begun = [], 0.0
@@ -135,7 +143,14 @@ def _climb(climb: Climb) -> dict[str, Any]:
             }
         )
         begun = knots[-1].time
-    return {"knots": len(climb.knots), "time": begun, "moves": rows, "failure": failure}
+    return {
+        "knots": len(climb.knots),
+        "time": begun,
+        "rates": dict(climb.rates),
+        "digest": digest,
+        "moves": rows,
+        "failure": failure,
+    }
 
 
 def _warnings(result: RouteResult) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 
 import numpy as np
 
@@ -11,14 +12,18 @@ from planner.motion import (
     BranchEndError,
     CollisionScene,
     JointSpace,
+    NoWayError,
+    Swing,
     branches,
     follow_poses,
     pose_between,
+    swing,
 )
+from planner.question import HandOnHold
 from planner.robots import Robot, scene_number
 from planner.route.climb import Move, Route
 
-__all__ = ["bodies_until_lifted", "candidates_on", "lasting", "start_joints"]
+__all__ = ["ends_of_swing", "start_joints", "swing_to"]
 
 
 def bodies_until_lifted(body: Pose, moves: Iterable[Move], limb: str) -> tuple[list[Pose], bool]:
@@ -53,10 +58,11 @@ def lasting(
     candidates: Iterable[Array],
     *,
     lifts: bool,
-) -> Iterator[Array]:
+) -> Iterator[tuple[Array, bool]]:
     """Yield those of a limb's joint angles that are clear, and stay so while the body moves.
 
-    Last come those that keep but the margin of hands at their holds, until they leave them.
+    With each comes whether it keeps the whole margin. Last come those that do not: they keep but
+    the margin of hands at their holds, until they leave them.
 
     Parameters
     ----------
@@ -96,10 +102,45 @@ def lasting(
         pairs = zip(spaces, [angles, *after], strict=True)
         least = [float(space.clearances(at[None]).min()) for space, at in pairs]
         if min(least) >= margin:
-            yield angles
+            yield angles, True
         elif min(least) >= at_hold and (not lifts or least[-1] >= margin):
             near.append(angles)
-    yield from near
+    yield from ((angles, False) for angles in near)
+
+
+def ends_of_swing(
+    scene: CollisionScene,
+    place: HandOnHold,
+    moves: Sequence[Move],
+    body: Pose,
+    joints: Mapping[str, Array],
+) -> list[list[Array]]:
+    """Return joint angles of a limb with its hand on its next hold [rad], the better kinds first.
+
+    First those that are clear until the limb lifts again, then those that keep but the margin of
+    hands at their holds; if there are none, those that are clear of nothing. The list is empty if
+    no joint angles were found.
+
+    Parameters
+    ----------
+    scene : CollisionScene
+    place : HandOnHold
+        The hand on its next hold.
+    moves : sequence of Move
+        Moves that are left.
+    body : Pose
+        Present pose of B in W.
+    joints : mapping of str to ndarray, shape (n,)
+        Angles of all limbs [rad].
+    """
+    limb, near, most = place.limb, joints[place.limb], 6
+    bodies, lifts = bodies_until_lifted(body, moves, limb)
+    found = candidates_on(scene.robot, limb, place.pose, bodies, near)
+    clear = lasting(scene, limb, place.pose, bodies, joints, found, lifts=lifts)
+    kinds: list[list[Array]] = [[], []]
+    for angles, whole in islice(clear, most):
+        kinds[0 if whole else 1].append(angles)
+    return [kind for kind in kinds if kind] or [kind for kind in [found[:most]] if kind]
 
 
 def candidates_on(
@@ -121,6 +162,36 @@ def candidates_on(
             except BranchEndError:
                 continue
     return sorted(found, key=lambda each: float(np.abs(each - near).max()))
+
+
+def swing_to(
+    scene: CollisionScene,
+    body: Pose,
+    joints: Mapping[str, Array],
+    limb: str,
+    kinds: Sequence[Sequence[Array]],
+) -> Swing:
+    """Return the swing of a limb to an end of the first kind that has a way.
+
+    Parameters
+    ----------
+    scene, body, joints, limb
+        As of `swing`.
+    kinds : sequence of sequence of ndarray, shape (n,)
+        Joint angles with the hand on its next hold [rad], as of `ends_of_swing`.
+
+    Raises
+    ------
+    NoWayError, BranchEndError
+        That of the first kind, if none has a way.
+    """
+    refused: list[NoWayError | BranchEndError] = []
+    for ends in kinds:
+        try:
+            return swing(scene, body, joints, limb, ends)
+        except (NoWayError, BranchEndError) as error:
+            refused.append(error)
+    raise refused[0]
 
 
 def start_joints(
@@ -147,6 +218,6 @@ def start_joints(
             clear = lasting(scene, limb, place.pose, until, joints, others, lifts=leaves)
             best = next(clear, None)
             if best is not None:
-                joints[limb] = best
+                joints[limb] = best[0]
                 break
     return joints

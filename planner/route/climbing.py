@@ -12,27 +12,29 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from itertools import islice, pairwise
+from itertools import pairwise
 
 import numpy as np
+from msgspec import structs
 
 from hand_models.base import Array, Pose
 from planner.deadline import DeadlineError
 from planner.motion import (
     BranchEndError,
+    NearestPair,
     NoWayError,
     check_shift,
+    met_in_shift,
     pose_between,
     shift_postures,
-    swing,
 )
 from planner.prepare import posture
 from planner.programs import CAP_SLACK
 from planner.question import HandOnHold, Objective
 from planner.robots import UnreachableError, scene_number, solve_limbs
 from planner.route.between import Passage
-from planner.route.branch_choice import bodies_until_lifted, candidates_on, lasting, start_joints
-from planner.route.climb import Move, Route
+from planner.route.branch_choice import ends_of_swing, start_joints, swing_to
+from planner.route.climb import Move, Route, stages
 from planner.route.first_checks import checked_stages, climb_scene, refuse
 from planner.route.held import (
     HeldPosture,
@@ -79,11 +81,14 @@ def plan_climb(
         If a wrist is not fixed, the body accelerates about an axis, palms have a margin, or a move
         gives joint angles of a limb that stays.
     """
+    # what is wrong with the route itself comes before what a climb cannot have
+    tuple(stages(route))
     solved = route
     if route.start.joints is None:
         solved = replace(route, start=replace(route.start, joints="solve"))
     refuse(solved)
-    planner, failure = _Planner(solved, (settings or ClimbSettings()).complete()), None
+    rates = (settings or ClimbSettings()).complete()
+    planner, failure = _Planner(solved, rates), None
     try:
         planner.begin()
         for number, move in enumerate(route.moves, start=1):
@@ -92,7 +97,7 @@ def plan_climb(
                 progress(number, len(route.moves))
     except _BlockedError as blocked:
         failure = blocked.failure
-    return Climb(route, tuple(planner.knots), failure)
+    return Climb(route, tuple(planner.knots), failure, structs.asdict(rates))
 
 
 class _BlockedError(Exception):
@@ -101,6 +106,11 @@ class _BlockedError(Exception):
     def __init__(self, failure: Failure) -> None:
         super().__init__(failure.reason)
         self.failure = failure
+
+
+def _in_the_way(met: NearestPair) -> NoPlanError:
+    """Return the error of a shift in which something is met."""
+    return NoPlanError(f"while the body shifts, {met}; shift the body less or elsewhere")
 
 
 class _Planner:
@@ -169,7 +179,7 @@ class _Planner:
             count = 2**halvings
             parts = [k / count for k in range(1, count)]
             bodies = [*(pose_between(first.body, goal, part) for part in parts), goal]
-            found = shift_postures(robot, hands, bodies, first.angles)
+            found = self._followed(hands, bodies)
             ways = {limb: np.vstack([first.angles[limb], each]) for limb, each in found.items()}
             halfway = [pose_between(a, b, 0.5) for a, b in pairwise([first.body, *bodies])]
             middle = {limb: 0.5 * (way[1:] + way[:-1]) for limb, way in ways.items()}
@@ -183,11 +193,25 @@ class _Planner:
         margin = scene_number("motion", "margin_at_hold")
         seen = check_shift(self._scene, [first.body, *bodies], ways, margin=margin)
         if not seen.clear:
-            raise NoPlanError(f"while the body shifts, {seen.nearest}")
+            raise _in_the_way(seen.nearest)
         for k, body in enumerate(bodies, start=1):
             angles = {**first.angles, **{limb: way[k] for limb, way in ways.items()}}
             stage = body is goal
             self._go(self._plan(replace(first, body=body, angles=angles), stage=stage), stage=stage)
+
+    def _followed(self, hands: Mapping[str, Pose], bodies: Sequence[Pose]) -> dict[str, Array]:
+        """Return joint angles of a shift; what is met is said before a limb that cannot follow."""
+        posed = self._at.posed
+        try:
+            return shift_postures(self._route.start.robot, hands, bodies, posed.angles)
+        except BranchEndError as error:
+            margin = scene_number("motion", "margin_at_hold")
+            met = met_in_shift(
+                self._scene, hands, posed.body, bodies[-1], posed.angles, margin=margin
+            )
+            if met is None:
+                raise
+            raise _in_the_way(met) from error
 
     def _require_clear(self, body: Pose, angles: Mapping[str, Array]) -> None:
         """Refuse a posture in which a link is in rock or in another."""
@@ -232,18 +256,16 @@ class _Planner:
         posed, limb = self._at.posed, move.hand.limb
         robot, target = self._route.start.robot, posed.body.inverse() @ move.hand.pose
         given = None if isinstance(move.joints, str) else move.joints.get(limb)
-        if isinstance(given, np.ndarray):
-            goals: Sequence[Array] = [given]
-        else:
-            left, place = self._route.moves[self._move :], move.hand.pose
-            bodies, lifts = bodies_until_lifted(posed.body, left, limb)
-            found = candidates_on(robot, limb, place, bodies, posed.angles[limb])
-            if not found:
-                solve_limbs(robot, {limb: target}, {}, np.zeros(3))
-                raise NoPlanError(f"no joint angles were found for {limb} on its new hold")
-            clear = lasting(self._scene, limb, place, bodies, posed.angles, found, lifts=lifts)
-            goals = [*islice(clear, 6)] or found[:6]
-        way = swing(self._scene, posed.body, posed.angles, limb, goals)
+        left = self._route.moves[self._move :]
+        kinds = (
+            [[given]]
+            if isinstance(given, np.ndarray)
+            else ends_of_swing(self._scene, move.hand, left, posed.body, posed.angles)
+        )
+        if not kinds:
+            solve_limbs(robot, {limb: target}, {}, np.zeros(3))
+            raise NoPlanError(f"no joint angles were found for {limb} on its new hold")
+        way = swing_to(self._scene, posed.body, posed.angles, limb, kinds)
         assert posed.moving is not None
         air = in_air(posed.moving)
         for k, angles in enumerate(way.path[1:], start=1):

@@ -44,6 +44,7 @@ def evaluate(
     RouteResult
         A plan for each stage, or `OutOfReach` if inverse kinematics finds no joint angles. Kinds
         of findings that a plan has at most once remain only in the stage with the largest value.
+        A stage that the climb fails to reach has none about links whose joints were solved for.
 
     Raises
     ------
@@ -64,6 +65,11 @@ def evaluate(
         if progress is not None:
             progress(len(plans), len(todo))
     found = [plans[i] for i in range(len(todo))]
+    if climb is not None and climb.fails:
+        found = [
+            answer if i in found_joints else _without_guessed_posture(answer)
+            for i, answer in enumerate(found)
+        ]
     for kind in ONE_OF_A_PLAN:
         found = _said_once(found, kind)
     return RouteResult(route, todo, tuple(found))
@@ -88,14 +94,20 @@ def _said_once(plans: Sequence[Plan | OutOfReach], kind: str) -> list[Plan | Out
     # of stages alike but for rounding, to a micrometre, the first
     worst = max(said, key=lambda i: round(said[i].value, 6), default=-1)
     said.pop(worst, None)
-    return [
-        _without(answer, said[i]) if isinstance(answer, Plan) and i in said else answer
-        for i, answer in enumerate(plans)
-    ]
+    return [_without(answer, said[i]) if i in said else answer for i, answer in enumerate(plans)]
 
 
-def _without(answer: Plan, finding: Finding) -> Plan:
-    """Return a plan without a finding and its warning."""
+def _without_guessed_posture(answer: Plan | OutOfReach) -> Plan | OutOfReach:
+    """Return an answer without findings about where links are in a posture that no climb has."""
+    for finding in answer.findings:
+        guessed = finding.field == "stance.joints"
+        if guessed and finding.kind in ("link_in_rock", "links_collide"):
+            answer = _without(answer, finding)
+    return answer
+
+
+def _without(answer: Plan | OutOfReach, finding: Finding) -> Plan | OutOfReach:
+    """Return an answer without a finding and its warning."""
     return replace(
         answer,
         findings=tuple(each for each in answer.findings if each != finding),

@@ -7,7 +7,7 @@ tensions, and the position of the body (its orientation along the shortest turn)
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -135,11 +135,14 @@ class Climb:
         In climbing order.
     failure : Failure or None
         Why the climb ends early; None if it runs from end to end.
+    rates : mapping of str to float
+        Rates of the controller on which the knots' times rest, by name, as of `ClimbSettings`.
     """
 
     route: Route
     knots: tuple[Knot, ...]
     failure: Failure | None = None
+    rates: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def fails(self) -> bool:

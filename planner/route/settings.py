@@ -48,7 +48,16 @@ class ClimbSettings(Strict, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         for name in self.__struct_fields__:
             value = getattr(self, name)
-            if value is not None and not 1e-4 <= value <= 1e4:
+            if value is None:
+                continue
+            number = isinstance(value, (int, float, np.integer, np.floating))
+            if isinstance(value, bool) or not number:
+                raise InvalidFieldError(
+                    f"must be a number from 0.0001 to 10000, got {value!r}; leave it out for that "
+                    "of climb.toml",
+                    field=name,
+                )
+            if not 1e-4 <= value <= 1e4:
                 raise InvalidFieldError(f"must be 0.0001 to 10000, got {value:g}", field=name)
 
     def complete(self) -> ClimbSettings:

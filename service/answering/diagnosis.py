@@ -65,4 +65,5 @@ def answer_diagnosis(request: DiagnosisRequest, robots: Robots = BUNDLED_ROBOTS)
         ],
         suspects=list(found.suspects),
         ambiguous=[list(pair) for pair in diagnosis.ambiguous(held=not request.turns)],
+        reason=found.reason,
     )

@@ -27,7 +27,9 @@ from .runs import ReplyLines as ReplyLines, Run as Run, TableLines as TableLines
 from .tally import Tally as Tally
 from .trajectories import (
     ClimbSummary as ClimbSummary,
+    read_climb as read_climb,
     read_climb_summary as read_climb_summary,
     read_trajectory as read_trajectory,
+    trajectory_digest as trajectory_digest,
     write_trajectory as write_trajectory,
 )

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import msgspec
@@ -18,8 +20,10 @@ from service.replies import WRENCH_AXES, ClimbFailureReply, KnotReply
 __all__ = [
     "ClimbSummary",
     "knot_columns",
+    "read_climb",
     "read_climb_summary",
     "read_trajectory",
+    "trajectory_digest",
     "write_trajectory",
 ]
 
@@ -122,11 +126,71 @@ def _wrong_after(before: KnotReply, knot: KnotReply) -> str | None:
     return None
 
 
+def trajectory_digest(folder: Path, rates: Mapping[str, float]) -> str:
+    """Return a digest (SHA-256, hexadecimal) of a folder's trajectory and the controller's rates.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder with the file that `write_trajectory` has written.
+    rates : mapping of str to float
+        As `Climb.rates`.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    """
+    found = hashlib.sha256(json.dumps(dict(rates), sort_keys=True).encode())
+    found.update(_lines_of(folder).read_bytes())
+    return found.hexdigest()
+
+
+def read_climb(folder: Path) -> tuple[list[KnotReply], ClimbSummary]:
+    """Read a climb that is to be played: knots and summary, as ``crux route`` has written both.
+
+    Raises
+    ------
+    InvalidInputError
+        If a file is missing or cannot be read, the trajectory is cut off, of another climb, or
+        edited: its knots have been verified as they were written.
+    """
+    knots, about = read_trajectory(folder), read_climb_summary(folder)
+    again, count = f"write both again with: crux route ROUTE -o {folder}", knots[-1].index + 1
+    if count != about.climb.knots:
+        raise InvalidInputError(
+            f"{folder}: the trajectory ends after {count} knots, the climb of summary.json has "
+            f"{about.climb.knots}; {again}",
+            field="DIR",
+        )
+    if trajectory_digest(folder, about.climb.rates) != about.climb.digest:
+        raise InvalidInputError(
+            f"{folder}: the trajectory, or its rates in summary.json, are not those that were "
+            f"planned (climb.digest differs): edited knots are not verified; {again}",
+            field="DIR",
+        )
+    return knots, about
+
+
 class ClimbOutcome(msgspec.Struct):
-    """End of a climb in a summary: ``failure`` is None if it runs from end to end."""
+    """End of a climb in a summary.
+
+    Attributes
+    ----------
+    failure : ClimbFailureReply or None
+        Why it ends early; None if it runs from end to end.
+    knots : int
+        Number of knots.
+    rates : dict of str to float
+        Rates of the controller on which the times rest, as of `Climb`.
+    digest : str
+        As `trajectory_digest` returns it.
+    """
 
     failure: ClimbFailureReply | None
     knots: int
+    rates: dict[str, float]
+    digest: str
 
 
 class ClimbSummary(msgspec.Struct):

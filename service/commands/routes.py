@@ -146,17 +146,21 @@ def _one(
         folder.mkdir(parents=True, exist_ok=True)
     tables.write_alone(folder / "route", folder)
     with tables.progress(f"planning the moves of {route.name}") as report:
-        climb = _climb(route, report)
+        climb, lacks = _climb(route, report)
     with tables.progress(f"planning {route.name}") as report:
         result = planner.evaluate(route, workers, report, climb)
+    _say_lacking(lacks)
     with tables.filling_folder():
-        files = planner.write_report(result, folder, climb)
         knots = [] if climb is None else [replies.KnotReply.of(knot) for knot in climb.knots]
-        files |= bulk.write_trajectory(knots, folder)
+        trajectory = bulk.write_trajectory(knots, folder)
+        digest = None
+        if climb is not None and knots:
+            digest = bulk.trajectory_digest(folder, climb.rates)
+        files = planner.write_report(result, folder, climb, digest) | trajectory
         files["stances"] = _write_stages(asked, result, folder / "stages")
     if as_json:
         tables.say(
-            planner.summary(result, climb)
+            planner.summary(result, climb, digest)
             | {"files": {name: str(path) for name, path in files.items()}}
         )
     else:
@@ -170,13 +174,18 @@ def _one(
 
 def _climb(
     route: planner.Route, report: Callable[[int, int], None] | None = None
-) -> planner.Climb | None:
-    """Plan the moves of a route; say so if these cannot be planned for what the route has."""
+) -> tuple[planner.Climb | None, UnsupportedError | None]:
+    """Plan the moves of a route, or return why these cannot be planned for what the route has."""
     try:
-        return planner.plan_climb(route, progress=report)
+        return planner.plan_climb(route, progress=report), None
     except UnsupportedError as error:
+        return None, error
+
+
+def _say_lacking(error: UnsupportedError | None) -> None:
+    """Say why there is no trajectory, once the stages are planned: an error of these says more."""
+    if error is not None:
         tables.remark(f"no trajectory: {error}")
-        return None
 
 
 def _write_stages(asked: _Asked, result: planner.RouteResult, folder: Path) -> Path:
@@ -210,10 +219,11 @@ def _stage(asked: _Asked, index: int, file: Path | None, own: options.Own, as_js
     stage = known[index]
     # later moves have a say in the joint angles, so that they can be kept
     with tables.working(f"planning the moves of {route.name}"):
-        climb = _climb(route)
+        climb, lacks = _climb(route)
     joints = None if climb is None else climb.stage_joints.get(index)
     request = options.with_extras(asked.stage(stage, joints), whole=not as_json)
     answer = answering.planned(request, own.robots)
+    _say_lacking(lacks)
     if file is not None:
         with tables.writing(file):
             _write_stance(asked.stage(stage, joints or answer.plan.joints, file.parent), file)

@@ -33,9 +33,11 @@ class DiagnosisReply(StanceReply, kw_only=True):
     - ``suspects``: the first of them, which have 95 % of the probability together: as ``lost`` of
       set-points.
     - ``ambiguous``: pairs of tiles of one finger whose slips look alike.
+    - ``reason``: why no slip is seen; null if one is.
     """
 
     seen: bool
     tiles: list[SuspectReply]
     suspects: list[LostTile]
     ambiguous: list[list[LostTile]]
+    reason: str | None = None

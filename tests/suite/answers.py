@@ -36,8 +36,10 @@ DIGITS = 13
 WORDS = {
     *("v", "title", "summary", "not_tested", "message", "reason", "warnings", "sentence"),
     *("claim", "claimed", "got", "time", "took", "solver", "rounds", "residual", "stream", "files"),
+    "digest",
 }
-"""Fields that are left out: sentences, clocks, counts of steps, remainders of rounding."""
+"""Fields that are left out: sentences, clocks, counts of steps, remainders of rounding and its
+digest."""
 
 PLACE = {"position", "force", "shear_axis", "normal_axis", "lateral_axis"}
 DETAIL = {

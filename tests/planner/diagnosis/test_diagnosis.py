@@ -11,6 +11,7 @@ from scipy.stats import weibull_min
 from hand_models.base import InvalidInputError, UnsupportedError
 from hand_models.fixed_wrist import slipped_hand
 from hand_models.hand import FINGERS
+from hand_models.parameters import bundled_table
 from planner.diagnosis import SlipDiagnosis
 from planner.prepare import prepare_stance
 from planner.solving import plan
@@ -138,11 +139,43 @@ def test_without_noise_the_tile_or_its_double_comes_first():
         data[each.tile.limb][each.finger] = each.tensions[0]
         found = diagnosis.diagnose(tensions=data)
         assert found.seen
+        assert found.reason is None
         assert found.tiles[0].tile == each.tile
         assert found.tiles[0].probability > 0.8
         assert found.tiles[0].expected == pytest.approx(
             each.tensions[0] - answer.hands[each.hand].tensions[each.finger]
         )
+
+
+def test_a_slip_that_is_not_seen_has_a_reason():
+    _, answer, diagnosis = diagnosed("wall-300")
+    numbers, before = bundled_table("diagnosis.toml", "planner.parameters"), tensions_of(answer)
+    f = before["rear_left"][1]
+    part, least = (numbers.positive("noise", name) for name in ("tension", "least_tension"))
+    deviation = math.hypot(part * f, least)
+
+    def off(by: float):
+        measured = tensions_of(answer)
+        measured["rear_left"][1] += by
+        return diagnosis.diagnose(tensions=measured)
+
+    found = off(-0.5 * deviation)
+    assert not found.seen
+    told = f"the tension of rear_left inner_left is off most, by {-0.5 * deviation:+.2g} N, 0.5 of "
+    assert found.reason.startswith(told)
+    shown = [
+        abs(each.tensions[0] - before[each.tile.limb][each.finger])
+        / math.hypot(part * each.tensions[0], least)
+        for each in diagnosis.signatures
+    ]
+    small = sum(change < numbers.positive("suspects", "seen") for change in shown)
+    assert 0 < small < len(shown)
+    assert f"those of {small} of {len(shown)} tiles would show less" in found.reason
+    # no slip winds a tendon up
+    found = off(8.0 * deviation)
+    assert not found.seen
+    assert "8 of its standard deviation, which the slip of no tile explains" in found.reason
+    assert off(min(each.tensions[0] - f for each in diagnosis.signatures if each.finger == 1)).seen
 
 
 def test_nothing_is_seen_where_nothing_slipped():

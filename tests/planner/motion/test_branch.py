@@ -17,6 +17,7 @@ from planner.motion import (
 )
 from planner.robots import RobotFile, robot_of
 from tests.planner.robots.test_coupled_joints import random_angles, random_arms
+from tests.suite.helpers.crawlers import crawler_in
 from tests.suite.helpers.robots import TWO_LINK, limbs_toml
 from tests.suite.helpers.stances_with_joints import two_link_robot
 from tests.suite.helpers.swings import BODY, ROBOT, palm, posture
@@ -137,6 +138,33 @@ def test_the_end_of_a_branch_names_the_joint_at_its_limit():
         follow_poses(robot, "leg", turned[0], path)
     assert caught.value.share == pytest.approx(5.0 / 9.0)  # 2.3 to 2.5 rad
     assert follow_poses(beyond, "leg", turned[0], path) == pytest.approx(np.array(turned))
+
+
+def test_a_limb_of_three_joints_says_how_few_they_are(tmp_path):
+    """Its hand moves in a plane that yaws; along the first joint's axis alone it cannot go."""
+    robot, limb = crawler_in(tmp_path), "limb03"
+    angles = np.array([0.1, 0.6, -0.6])
+    here = hand_at(angles, limb, robot)
+    up = Pose(here.position + np.array([0.0, 0.0, 0.05]), here.rotation)
+    few = r"a limb of 3 joints moves its hand in 3 of 6 ways only, 50 mm .*; choose another path$"
+    with pytest.raises(BranchEndError, match=few) as caught:
+        follow_poses(robot, limb, angles, [up])
+    assert caught.value.few_joints
+    with pytest.raises(BranchEndError, match=r"3 of 6 .*; shift the body less or elsewhere$"):
+        shift_postures(robot, {limb: here}, [up], {limb: angles})
+    # turned about the first joint's axis beyond its limit: what stops it is the limit
+    chain = robot.chains[limb]
+    last = np.array([chain.upper[0] - 0.05, 0.6, -0.6])
+    there = hand_at(last, limb, robot)
+    turns = [turns_about([0.0, 0.0, 0.01 * k]) for k in range(1, 11)]
+    beyond = [
+        Pose(chain.shoulder + turn @ (there.position - chain.shoulder), turn @ there.rotation)
+        for turn in turns
+    ]
+    with pytest.raises(BranchEndError, match=rf"{limb}_yaw is at its limit") as caught:
+        follow_poses(robot, limb, last, beyond)
+    assert caught.value.share == pytest.approx(0.5)
+    assert not caught.value.few_joints
 
 
 def test_hands_stay_while_the_body_shifts():

@@ -16,11 +16,13 @@ from planner.motion import (
     check_shift,
     check_way,
     clear_branches,
+    met_in_shift,
     pose_between,
     shift_postures,
     swing,
 )
 from planner.scene.solids import capsule_solids, distance_between
+from tests.suite.helpers.stances import wall
 from tests.suite.helpers.swings import BODY, PLACES, ROBOT, ball, palm, posture, rock, rough
 
 LIMB = "front_left"
@@ -135,6 +137,31 @@ def test_of_several_ends_a_later_one_may_have_the_straight_way():
     assert found.path[-1] == pytest.approx(easy, abs=1e-9)
 
 
+def length(found):
+    return np.linalg.norm(
+        np.diff(found.path[found.retreat : found.approach + 1], axis=0), axis=1
+    ).sum()
+
+
+def test_the_shortest_of_the_ways_to_several_ends_is_taken():
+    """Around a ball to a near end, not straight to a far one, whatever their order."""
+    place, clear = (0.7, 0.75), CollisionScene(ROBOT, [rock()])
+    ends = clear_branches(clear, BODY, posture(), LIMB, palm(*place), count=6)
+    near = min((swing(clear, BODY, posture(), LIMB, [each]) for each in ends), key=length)
+    middle = near.path[[near.retreat, near.approach]].mean(axis=0)
+    hand = BODY @ ROBOT.hand_poses({LIMB: middle})[LIMB]
+    scene = CollisionScene(ROBOT, [rock(), ball(BODY.rotation.T @ hand.position, 0.05)])
+    alone = [swing(scene, BODY, posture(), LIMB, [each]) for each in ends]
+    shortest = min(alone, key=length)
+    assert shortest.how == "searched"
+    assert length(shortest) < 1.05 * length(near)
+    assert min(length(each) for each in alone if each.how == "straight") > 1.5 * length(near)
+    for order in (ends, ends[::-1]):
+        found = swing(scene, BODY, posture(), LIMB, order)
+        check_whole(scene, found)
+        assert np.array_equal(found.path, shortest.path)
+
+
 def test_a_swing_without_a_way_says_which_link_meets_what():
     """A wall of boulders across the limb's way."""
     wall_of = [ball((0.85, y, z), 0.2) for y in (-0.1, 0.1, 0.3, 0.5, 0.7, 0.9) for z in (0.1, 0.3)]
@@ -217,6 +244,30 @@ def test_a_body_that_shifts_into_rock_says_so():
     assert not seen.clear
     assert (seen.nearest.first, seen.nearest.second) == ("body", "boulder")
     assert str(seen.nearest).startswith("body ")
+
+
+def test_what_is_met_on_a_shift_that_ends_early_is_named():
+    hands = {limb: BODY @ pose for limb, pose in ROBOT.hand_poses(posture()).items()}
+    wall_alone = CollisionScene(ROBOT, [rock()])
+    into_rock = Pose(BODY.position - 0.6 * BODY.rotation[:, 2], BODY.rotation)
+    with pytest.raises(BranchEndError):
+        shift_postures(ROBOT, hands, [into_rock], posture())
+    met = met_in_shift(wall_alone, hands, BODY, into_rock, posture())
+    assert (met.first, met.second) == ("body", "wall")
+    # how deep the body ends behind the rock's face, but for the spacing of points along it
+    body = into_rock.apply(wall_alone.body.reshape(-1, 3)) @ wall()[:, 2]
+    deepest = (body.reshape(-1, 2).min(axis=1) - wall_alone.radii[: len(wall_alone.body)]).min()
+    assert deepest - 0.02 < met.distance <= deepest
+    # away from it a limb is stretched, and nothing is met
+    away = Pose(BODY.position + 0.6 * BODY.rotation[:, 2], BODY.rotation)
+    with pytest.raises(BranchEndError, match="stretched"):
+        shift_postures(ROBOT, hands, [away], posture())
+    assert met_in_shift(wall_alone, hands, BODY, away, posture()) is None
+    # but for a ball that a link meets before, beside the way of the body
+    scene = CollisionScene(ROBOT, [rock(), ball((0.22, 0.36, 0.58))])
+    met = met_in_shift(scene, hands, BODY, away, posture())
+    assert met.second == "boulder"
+    assert met.first != "body"
 
 
 def test_nothing_slips_between_two_postures():

@@ -342,6 +342,36 @@ def test_a_link_in_the_way_is_named(route):
     assert len(found.knots) == 1
 
 
+def test_a_shift_into_rock_says_so(route):
+    """A limb could not follow either: but what is so is that the body ends in the rock."""
+    (move,), start = route.moves, route.start
+    into = Pose(start.body.position + 0.5 * start.hands[0].pose.rotation[:, 2], start.body.rotation)
+    found = plan_climb(replace(route, moves=(replace(move, body=into),)))
+    assert (found.failure.phase, len(found.knots)) == ("shift", 1)
+    assert re.fullmatch(
+        r"while the body shifts, body is [\d.]+ mm deep in rock of \w+; shift the body less or "
+        "elsewhere",
+        found.failure.reason,
+    )
+
+
+def test_joints_of_a_move_alone_are_refused_before_anything_is_planned(route):
+    (move,) = route.moves
+    bare = replace(route.start, joints=None)
+    for limb in ("rear_left", move.hand.limb):
+        given = replace(move, joints={limb: np.zeros(7)})
+        with pytest.raises(InvalidInputError, match=r"requires stance\.joints") as raised:
+            plan_climb(replace(route, start=bare, moves=(given,)))
+        assert raised.value.field == "moves[0].joints"
+
+
+@pytest.mark.parametrize("value", ["50", True, [50.0], float("nan"), 0.0, 1e5])
+def test_rates_that_are_no_numbers_are_refused(value):
+    with pytest.raises(InvalidInputError, match=r"must be .*0\.0001 to 10000, got ") as raised:
+        ClimbSettings(joint_speed=value)
+    assert raised.value.field == "joint_speed"
+
+
 def test_what_a_climb_cannot_have_is_refused(route):
     floating = tuple(replace(hand, wrist="floating") for hand in route.start.hands)
     with pytest.raises(UnsupportedError) as raised:
@@ -355,8 +385,9 @@ def test_what_a_climb_cannot_have_is_refused(route):
     assert raised.value.field == "limits.palm_margin"
     (move,) = route.moves
     given = replace(move, joints={"rear_left": np.zeros(7)})
+    solved = replace(route.start, joints="solve")
     with pytest.raises(UnsupportedError) as raised:
-        plan_climb(replace(route, moves=(given,)))
+        plan_climb(replace(route, start=solved, moves=(given,)))
     assert raised.value.field == "moves[0].joints.rear_left"
     air = replace(move.hand, hold_in_hand=Pose(np.array([0.0, 0.0, 0.5]), np.eye(3)))
     with pytest.raises(InvalidInputError) as raised:

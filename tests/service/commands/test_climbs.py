@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import planner
-from service.bulk import read_climb_summary, read_trajectory
+from service.bulk import read_climb, read_climb_summary, read_trajectory
 from service.commands.cli import run_command_line
 from service.replies import ClimbFailureReply, KnotReply
 from service.requests import RouteRequest
@@ -53,7 +53,9 @@ def test_a_folder_has_all_of_a_climb(written):
         "05-place-front_left.json",
     ]
     assert read_trajectory(written) == [KnotReply.of(knot) for knot in climbed().climb.knots]
-    about = read_climb_summary(written)
+    knots, about = read_climb(written)
+    assert len(knots) == about.climb.knots
+    assert about.climb.rates == msgspec.structs.asdict(planner.ClimbSettings().complete())
     assert (about.route, about.robot, about.climb.failure) == ("two moves", "robosimian", None)
 
 
@@ -146,6 +148,39 @@ def test_a_climb_that_fails_counts_if_the_route_has_joints():
     climb = dataclasses.replace(climb, route=dataclasses.replace(climb.route, start=start))
     assert climb.fails
     assert [*climb.stage_joints] == [0, 1, 2]
+
+
+def test_nothing_is_said_of_links_in_stages_that_a_climb_does_not_reach():
+    """Their joints were solved for, for hands alone: no climb has this posture."""
+    climb = failed().climb
+    solved = dataclasses.replace(climb.route.start, joints="solve")
+    route = dataclasses.replace(climb.route, start=solved, moves=climb.route.moves[:1])
+    failure = planner.Failure(1, "unload", "front_left", "a finger jams")
+    ended = dataclasses.replace(climb, route=route, knots=climb.knots[:1], failure=failure)
+
+    def said(climb):
+        plans = planner.evaluate(route, climb=climb).plans
+        return [{each.kind for each in plan.findings} for plan in plans]
+
+    assert said(None) == [
+        {"link_in_rock"},
+        {"link_in_rock", "palm_without_travel"},
+        {"link_in_rock"},
+    ]
+    # the start is planned with the climb's joints, which are clear
+    assert said(ended) == [set(), {"palm_without_travel"}, set()]
+
+
+def test_what_is_wrong_is_said_once(tmp_path, capfd):
+    """A route whose joints are wrong is no climb either, but that is not what has to be mended."""
+    route = two_moves()
+    start = msgspec.structs.replace(route.stance, joints={})
+    given = [msgspec.structs.replace(route.moves[0], joints={"rear_left": [0.0] * 7})]
+    path = file_of(msgspec.structs.replace(route, stance=start, moves=given), tmp_path)
+    assert run_command_line(["route", path, "-o", str(tmp_path / "out")]) == BAD_INPUT
+    words = complaint(capfd)
+    assert words.count("crux: ") == 1
+    assert "stance.joints: missing for" in words
 
 
 @pytest.mark.slow

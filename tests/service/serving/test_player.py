@@ -17,7 +17,7 @@ import zenoh
 from scipy.spatial.transform import Rotation
 
 from hand_models.base import UnsupportedError
-from service.bulk import write_trajectory
+from service.bulk import trajectory_digest, write_trajectory
 from service.commands.cli import run_command_line
 from service.replies import KnotReply
 from service.serving import climb_set_points, open_session, play, zenoh_config
@@ -49,7 +49,9 @@ def robot(listening) -> DryRobot:
 
 def climb_folder(folder: Path, knots: list[KnotReply], failure: dict | None = None) -> Path:
     write_trajectory(knots, folder)
-    end = {"failure": failure, "knots": len(knots)}
+    rates = {"tension_rate": 50.0}
+    digest = trajectory_digest(folder, rates)
+    end = {"failure": failure, "knots": len(knots), "rates": rates, "digest": digest}
     about = {"route": "two moves", "robot": "robosimian", "climb": end}
     (folder / "summary.json").write_text(json.dumps(about))
     return folder
@@ -204,6 +206,32 @@ def test_what_cannot_be_played_is_refused(knots, tmp_path, capfd):
     unsure = [msgspec.structs.replace(knot, verified=knot.index != 2) for knot in knots]
     assert run_command_line(["play", str(climb_folder(tmp_path, unsure))]) == BAD_INPUT
     assert "knot 2 is not verified" in complaint(capfd)
+
+
+def test_an_edited_climb_is_refused(knots, tmp_path, capfd):
+    """Also if all its numbers could be those of a climb."""
+
+    def refused(folder: Path) -> bool:
+        assert run_command_line(["play", str(folder), "--wait", "0"]) == BAD_INPUT
+        return "climb.digest differs" in complaint(capfd)
+
+    heavier = msgspec.structs.replace(knots[2], hands=[*knots[2].hands])
+    hand = heavier.hands[0]
+    tensions = [hand.tensions[0] + 1e-9, *hand.tensions[1:]]
+    heavier.hands[0] = msgspec.structs.replace(hand, tensions=tensions)
+    folder = climb_folder(tmp_path, knots)
+    unchanged = (folder / "summary.json").read_text()
+    write_trajectory([*knots[:2], heavier, *knots[3:]], folder)
+    assert refused(folder)
+    # as it was, with other rates
+    write_trajectory(knots, folder)
+    (folder / "summary.json").write_text(unchanged.replace("50.0", "60.0"))
+    assert refused(folder)
+    about = json.loads(unchanged)
+    del about["climb"]["digest"]
+    (folder / "summary.json").write_text(json.dumps(about))
+    assert run_command_line(["play", str(folder)]) == BAD_INPUT
+    assert "missing required field `digest`" in complaint(capfd)
 
 
 def test_a_second_player_is_refused_while_the_first_one_plays(knots, listening, robot, tmp_path):
