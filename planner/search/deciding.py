@@ -241,8 +241,10 @@ class Decision:
         allowed = np.ones(len(ground.wall.bodies), dtype=bool)
         for limb, p in enumerate(members):
             allowed &= ground.reached[p, :, limb]
+        hindered = False
         for body in np.flatnonzero(allowed).tolist():
             state = State(body, members)
+            hindered |= state in self._stopped
             if state in self._bad or state in self._stopped:
                 allowed[body] = False
         back = dict[int, int]()
@@ -260,11 +262,13 @@ class Decision:
                     return path[::-1]
                 for other in np.flatnonzero(ground.beside[body] & allowed & ~seen).tolist():
                     if (State(body, members), State(other, members)) in self._blocked:
+                        hindered = True
                         continue
                     seen[other] = True
                     back[other] = body
                     ahead.append(other)
             front = ahead
+        self.hindered |= hindered
         return []
 
     def _states(self, way: Way) -> list[State]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from itertools import pairwise
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from planner.search.learning import learnt, some_lifts
 from planner.search.lifts import Ground, Lifts
 from planner.search.programs import Programs
 from planner.search.settings import SEARCH_SETTINGS
-from planner.search.standing import standing_climb
 from planner.search.wall import Ends, State, Wall
 
 __all__ = ["SearchProgress", "search"]
@@ -98,11 +96,6 @@ class _Search:
         """Run the search to its end, or till time is over."""
         settings = SEARCH_SETTINGS
         self._learn()
-        standing, states = standing_climb(self._ground, self._table, self._programs)
-        passed = {*pairwise(states), *((each, each) for each in states)}
-        passed.update(zip(states[:-2], states[2:], strict=True))
-        if standing >= (at_least or 0.0) and not passed & self._blocked:
-            self._states, self._least = states, standing
         if at_least is not None:
             self._ceiling = np.inf
         while not self._late():
@@ -118,7 +111,7 @@ class _Search:
                 multiple = decided.multiple if decided.multiple > 0.0 else -np.inf
                 # below the least load factor that is asked for, nothing counts
                 self._ceiling = -np.inf if multiple == at_least else multiple
-                if not decided.hindered and standing < decided.multiple:
+                if not decided.hindered:
                     self._prove(decided, multiple)
         return self._answer(False)
 

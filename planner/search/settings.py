@@ -46,8 +46,6 @@ class SearchSettings:
     """What counts as zero in the compiled simplex method [1]: wrenches are in `WRENCH_UNIT`."""
     pivots: int = 2000
     """Steps of the simplex method at most; some forty are usual."""
-    most_standing: int = 300_000
-    """Stances that may lead from the start to the goal without a lift: some seconds."""
     most_lifts: int = 12_000_000
     """Lifts that may be kept at once: some 1 GB."""
 
