@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hand_models.base import Array, Indices, go_on
+from hand_models.base import Array, Indices, LimitError, go_on
 from planner.certification.climb_certificate import ClimbCertificate
 from planner.certification.settings import CERTIFICATION_SETTINGS
 
@@ -47,6 +47,11 @@ def check_bound(certificate: ClimbCertificate) -> BoundCheck:
     Parameters
     ----------
     certificate : ClimbCertificate
+
+    Raises
+    ------
+    LimitError
+        If there are more states than 63 bits can number.
     """
     graph = _Graph(certificate)
     ends = [
@@ -99,6 +104,11 @@ class _Graph:
     def __init__(self, certificate: ClimbCertificate) -> None:
         self.of = c = certificate
         count, limbs = len(c.base), len(c.limbs)
+        if (count + 1) ** limbs * max(1, len(c.wrenches)) >= np.iinfo(np.int64).max:
+            raise LimitError(
+                f"{count} placements, {len(c.wrenches)} bodies and {limbs} limbs are too many: the "
+                "number of a state needs 63 bits at most; leave placements out"
+            )
         self.reached = np.ascontiguousarray(c.reached.transpose(1, 2, 0))
         # a hand in the air is the last: it holds nothing, and moves no weight
         self.supports = np.zeros((count + 1, len(c.directions)))

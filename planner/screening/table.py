@@ -90,6 +90,10 @@ class ScreeningTable:
         """Return the table with the last directions only."""
         return self._chosen(np.arange(len(self.directions) - count, len(self.directions)))
 
+    def first(self, count: int) -> ScreeningTable:
+        """Return the table with the first directions only."""
+        return self._chosen(np.arange(min(count, len(self.directions))))
+
     def trimmed(self, count: int) -> ScreeningTable:
         """Return the table with so many directions at most: the first half and the latest."""
         if len(self.directions) <= count:

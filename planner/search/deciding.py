@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Indices
+from hand_models.base import Array, Indices
 from planner.search.lifts import Lifts
 from planner.search.programs import Programs
 from planner.search.settings import SEARCH_SETTINGS
@@ -58,17 +58,26 @@ class Decision:
     blocked : frozenset of pairs of State
     """
 
-    def __init__(self, lifts: Lifts, programs: Programs, blocked: Blocked) -> None:
+    def __init__(
+        self,
+        lifts: Lifts,
+        programs: Programs,
+        blocked: Blocked,
+        attempts: float,
+        barred: set[Way] | None = None,
+    ) -> None:
+        self._attempts = attempts
+        self.stuck = False
         self._lifts, self._nodes, self._programs = lifts, lifts.nodes, programs
         self._least = lifts.multiple * (1.0 - 0.1 * SEARCH_SETTINGS.exact)
         self._factors = np.full(len(lifts), np.nan)
         self._blocked = blocked
         self._stopped = {first for first, second in blocked if first == second}
-        self._barred = set[Way]()
-        self._bad = set[State]()
+        self.barred = barred or set[Way]()
+        self._bad, self._good = set[State](), set[State]()
         self._turn = count()
         self._queues = [list[tuple[float, int, Indices]](), list[tuple[float, int, Indices]]()]
-        self.hindered = False
+        self.hindered = self.partial = False
         self.route = self._shift_alone()
         self.exhausted = 0
         self._parents = [self._nodes["out"], self._nodes["parent_1"], self._nodes["parent_2"]]
@@ -85,6 +94,12 @@ class Decision:
     def multiple(self) -> float:
         """The least load factor that is asked for."""
         return self._lifts.multiple
+
+    @property
+    def directions(self) -> Array:
+        """Directions of all states that it rests on, shape (D, 6)."""
+        both = self._lifts.table.directions, self._lifts.stances.directions
+        return np.unique(np.vstack(both), axis=0)
 
     @property
     def ended(self) -> bool:
@@ -151,16 +166,7 @@ class Decision:
             return
         self._solve(chosen)
         chosen = chosen[self._nodes["out"][chosen] == 0]
-        loose = chosen[self._parents[side][chosen] == -side]
-        if len(loose):
-            # lifts that the end itself may lead to
-            _, met = self._lifts.expand(loose, 0)
-            met = met[met[:, 1] == -side]
-            lifts, first = np.unique(met[:, 0], return_index=True)
-            self._vias[side][lifts] = met[first, 2]
-            lost = np.setdiff1d(loose, lifts)
-            self._release(side, lost)
-            chosen = np.setdiff1d(chosen, lost)
+        chosen = self._joined(side, chosen)
         self._nodes["closed"][chosen] = side
         claimed, met = self._lifts.expand(chosen, side)
         self._push(side, claimed)
@@ -184,25 +190,76 @@ class Decision:
             new = np.setdiff1d(new, some)
             new = new[self._nodes["out"][new] == 0]
 
-    def _release(self, side: int, lost: Indices) -> None:
-        """Take lifts from an end; they may be reached from closed lifts that they are joined with."""
-        if not len(lost):
-            return
-        nodes = self._nodes
-        passed = lost[nodes["closed"][lost] == side]
-        nodes["claimed"][lost] &= ~side
-        nodes["claimed"][passed] = 0
-        nodes["closed"][passed] = 0
-        for part in np.array_split(lost, max(1, len(lost) // SEARCH_SETTINGS.at_once)):
-            _, met = self._lifts.expand(part, 0)
-            own, to = met[:, 0], met[:, 1]
-            owners = np.where(to < 0, -to, nodes["closed"][to])
-            met = met[(nodes["closed"][own] == 0) & (nodes["claimed"][own] & owners == 0)]
-            for i, j, place in met.tolist():
-                owner = -j if j < 0 else int(nodes["closed"][j])
-                if not nodes["claimed"][i] & owner and self._free(owner, j, i, place):
-                    self._claim(owner, np.array([i]), j, place)
-                    self._push(owner, np.array([i]))
+    def _joined(self, side: int, chosen: Indices) -> Indices:
+        """Return the lifts that four hands that hold enough join with their end.
+
+        Where the stances on the way fail, another passed lift becomes the parent.
+        """
+        held, others = list[int](), dict[int, Iterator[tuple[int, int]]]()
+        parents, vias = self._parents[side], self._vias[side]
+        left = chosen[vias[chosen] >= 0]
+        loose, attempts = chosen[vias[chosen] < 0], self._attempts
+        if not attempts:
+            held, left = left.tolist(), left[:0]
+        while len(left) or len(loose):
+            ways = [
+                self._way(side, *row)
+                for row in zip(parents[left].tolist(), left.tolist(), vias[left].tolist(), strict=True)
+            ]
+            self._solve_stances(ways if attempts else [])
+            failed = loose.tolist()
+            for lift, way in zip(left.tolist(), ways, strict=True):
+                fits = way not in self.barred and (not self._attempts or self._states(way))
+                (held if fits else failed).append(lift)
+            new = [lift for lift in failed if lift not in others]
+            if new:
+                _, met = self._lifts.expand(np.array(new), 0)
+                to = met[:, 1]
+                met = met[(to == -side) | ((to >= 0) & (self._nodes["closed"][to] == side))]
+                order = np.argsort(met[:, 0], kind="stable")
+                met = met[order]
+                firsts = np.searchsorted(met[:, 0], [*new, len(self._nodes)])
+                for i, lift in enumerate(new):
+                    own = np.unique(met[firsts[i] : firsts[i + 1], 1:], axis=0)
+                    others[lift] = iter(list(map(tuple, own.tolist())))
+            again, attempts = list[int](), attempts - 1
+            if attempts == 0:
+                self._nodes["claimed"][failed] &= ~side
+                break
+            for lift in failed:
+                for parent, place in others[lift]:
+                    if not self._bad_ends(self._way(side, parent, lift, place)):
+                        parents[lift], vias[lift] = parent, place
+                        again.append(lift)
+                        break
+                else:
+                    self._nodes["claimed"][lift] &= ~side
+            left, loose = np.array(again, dtype=np.intp), loose[:0]
+        return np.unique(np.array(held, dtype=np.intp))
+
+    def _ends_of(self, way: Way) -> list[State]:
+        """Return the first and the last stance of a shift between two lifts."""
+        members, bodies = self._stance(way), self._lifts.bodies
+        both = {int(bodies[lift]) for lift in (way.before, way.after) if lift >= 0}
+        return [State(body, members) for body in both]
+
+    def _bad_ends(self, way: Way) -> bool:
+        return way in self.barred or not self._bad.isdisjoint(self._ends_of(way))
+
+    def _solve_stances(self, ways: list[Way]) -> None:
+        """Solve the stances at the ends of shifts together, and take over what their bounds say."""
+        left = {state for way in ways for state in self._ends_of(way)}
+        while left := {each for each in left if each not in self._bad and each not in self._good}:
+            # one body of each first: its direction may rule out the others
+            some = list({each.members: each for each in sorted(left)}.values())
+            bodies, members = (np.array(column) for column in zip(*some, strict=True))
+            factors = self._programs.stances(some)
+            low = factors < self._least
+            self._good.update(each for each, fails in zip(some, low, strict=True) if not fails)
+            self._bad.update(each for each, fails in zip(some, low, strict=True) if fails)
+            self._bad.update(
+                self._lifts.ruled_out(members[low], *self._programs.bounding(some, low))
+            )
 
     # ways
 
@@ -210,11 +267,6 @@ class Decision:
         if side == 1:
             return Way(parent, lift, place)
         return Way(lift, parent, place)
-
-    def _free(self, side: int, parent: int, lift: int, place: int) -> bool:
-        """Whether something may join a lift with its parent, as far as is known."""
-        way = self._way(side, parent, lift, place)
-        return way not in self._barred and bool(self._shift(self._stance(way), *self._span(way)))
 
     def _stance(self, way: Way) -> tuple[int, ...]:
         lift = way.before if way.before >= 0 else way.after
@@ -241,12 +293,10 @@ class Decision:
         allowed = np.ones(len(ground.wall.bodies), dtype=bool)
         for limb, p in enumerate(members):
             allowed &= ground.reached[p, :, limb]
-        hindered = False
         for body in np.flatnonzero(allowed).tolist():
             state = State(body, members)
-            hindered |= state in self._stopped
-            if state in self._bad or state in self._stopped:
-                allowed[body] = False
+            self.hindered |= state in self._stopped
+            allowed[body] = state not in self._bad and state not in self._stopped
         back = dict[int, int]()
         front = np.flatnonzero(starts & allowed).tolist()
         seen = starts & allowed
@@ -262,13 +312,12 @@ class Decision:
                     return path[::-1]
                 for other in np.flatnonzero(ground.beside[body] & allowed & ~seen).tolist():
                     if (State(body, members), State(other, members)) in self._blocked:
-                        hindered = True
+                        self.hindered = True
                         continue
                     seen[other] = True
                     back[other] = body
                     ahead.append(other)
             front = ahead
-        self.hindered |= hindered
         return []
 
     def _states(self, way: Way) -> list[State]:
@@ -315,23 +364,16 @@ class Decision:
 
     def _meet(self, side: int, i: int, j: int, place: int) -> bool:
         """Try the climb over a lift that one end has passed, and one that the other has."""
-        nodes = self._nodes
-        while True:
-            if nodes["closed"][i] != side or (j >= 0 and nodes["closed"][j] != 3 - side):
-                return False
-            middle = Way(i, j, place) if side == 1 else Way(j, i, place)
-            if middle in self._barred:
-                return False
-            first, last = (i, j) if side == 1 else (j, i)
-            ways = [*reversed(list(self._chain(1, first))), middle, *self._chain(2, last)]
-            failed = self._try(ways) if self._states(middle) else middle
-            if failed is None:
-                return True
-            if failed is middle:
-                return False
-            # the lift that hung on it
-            mine = 1 if ways.index(failed) < ways.index(middle) else 2
-            self._detach(mine, failed.after if mine == 1 else failed.before)
+        if j >= 0 and self._nodes["closed"][j] != 3 - side:
+            return False
+        middle = Way(i, j, place) if side == 1 else Way(j, i, place)
+        if middle in self.barred or not self._states(middle):
+            return False
+        first, last = (i, j) if side == 1 else (j, i)
+        ways = [*reversed(list(self._chain(1, first))), middle, *self._chain(2, last)]
+        failed = self._try(ways)
+        self.stuck = failed is not None and failed is not middle
+        return failed is None or self.stuck
 
     def _chain(self, side: int, lift: int) -> Iterator[Way]:
         """Return the ways from a lift back to its end; none from the end itself."""
@@ -344,7 +386,7 @@ class Decision:
         """Return the first way that fails; None, and the climb is kept, if all hold."""
         states = list[State]()
         for way in ways:
-            between = self._states(way) if way not in self._barred else []
+            between = self._states(way) if way not in self.barred else []
             if not between:
                 return way
             if way.before >= 0:
@@ -364,43 +406,5 @@ class Decision:
         return None
 
     def _bar(self, way: Way) -> None:
-        self._barred.add(way)
+        self.barred.add(way)
         self.hindered = True
-
-    def _detach(self, side: int, lift: int) -> None:
-        """Join what hangs on a lift with its end in another way, or release it."""
-        nodes = self._nodes
-        hangs = np.zeros(len(nodes), dtype=bool)
-        hangs[lift] = True
-        closed_by = nodes["closed"]
-        mine = np.flatnonzero(
-            (nodes["claimed"] & side > 0)
-            & ((closed_by == side) | (closed_by == 0))
-            & (self._parents[side] >= 0)
-        )
-        parents = self._parents[side][mine]
-        while True:
-            more = mine[hangs[parents] & ~hangs[mine]]
-            if not len(more):
-                break
-            hangs[more] = True
-        branch = np.flatnonzero(hangs)
-        passed = branch[closed_by[branch] == side]
-        for part in np.array_split(passed, max(1, len(passed) // SEARCH_SETTINGS.at_once)):
-            _, met = self._lifts.expand(part, 0)
-            to = met[:, 1]
-            outside = (to == -side) | ((to >= 0) & (closed_by[to] == side) & ~hangs[to])
-            for i, j, place in met[outside].tolist():
-                if not self._free(side, j, i, place):
-                    continue
-                if not self._states(self._way(side, j, i, place)):
-                    continue
-                parent, via = j, place
-                while True:
-                    before, way = int(self._parents[side][i]), int(self._vias[side][i])
-                    self._parents[side][i], self._vias[side][i] = parent, via
-                    if i == lift:
-                        return
-                    parent, via, i = i, way, before
-        self._release(side, branch)
-

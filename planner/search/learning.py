@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from hand_models.base import Indices, go_on
-from planner import deadline
+from hand_models.base import Indices
 from planner.screening import ScreeningTable, StanceIndices
 from planner.search.lifts import Ground
 from planner.search.programs import Programs
@@ -41,7 +42,11 @@ def some_lifts(ground: Ground, count: int, seed: int) -> StanceIndices:
 
 
 def learnt(
-    table: ScreeningTable, programs: Programs, lifts: StanceIndices, count: int
+    table: ScreeningTable,
+    programs: Programs,
+    lifts: StanceIndices,
+    count: int,
+    check: Callable[[], None],
 ) -> ScreeningTable:
     """Return a table with up to so many directions more: those of the lifts that look best.
 
@@ -51,13 +56,14 @@ def learnt(
     programs : Programs
     lifts : StanceIndices
     count : int
+    check : callable
+        Called again and again; what it raises ends the learning.
     """
     ends, slack = table.ends(lifts), 1.0 + SEARCH_SETTINGS.exact
     solved = np.zeros(len(lifts.bodies), dtype=bool)
     together = 16
     while count > 0:
-        deadline.check("directions were learnt")
-        go_on()
+        check()
         bounds = np.where(solved | (ends[:, 0] > ends[:, 1] * slack), -np.inf, ends[:, 1])
         size = min(together, count, len(bounds))
         best = np.argpartition(-bounds, size - 1)[:size] if size else np.zeros(0, dtype=np.intp)

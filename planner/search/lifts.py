@@ -5,6 +5,7 @@ A lift is a body, a limb in the air and placements of the others.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -13,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, go_on
-from planner import deadline
-from planner.screening import ScreeningTable
+from planner.screening import ScreeningTable, StanceIndices
 from planner.search.settings import SEARCH_SETTINGS
-from planner.search.wall import Ends, Wall
+from planner.search.wall import Ends, State, Wall
 
 __all__ = ["Ground", "Lifts"]
 
@@ -130,6 +130,8 @@ class Lifts:
     ----------
     ground : Ground
     table : ScreeningTable
+    stances : ScreeningTable
+        The directions that stances of four hands have to pass.
     multiple : float
         Least load factor.
     tops : ndarray, shape (B,)
@@ -144,10 +146,13 @@ class Lifts:
         Number of each triple, ascending.
     nodes : ndarray of records, shape (n,)
         State of each lift in a search.
+    counts : ndarray of int, shape (B, L)
+        Lifts of each body and limb in the air.
     """
 
     ground: Ground
     table: ScreeningTable
+    stances: ScreeningTable
     multiple: float
     tops: Array
     bodies: Indices
@@ -156,35 +161,56 @@ class Lifts:
     starts: Indices
     keys: Indices
     nodes: NDArray[np.void]
+    counts: Indices
 
     @classmethod
-    def passing(cls, ground: Ground, table: ScreeningTable, multiple: float) -> Self:
+    def passing(
+        cls,
+        ground: Ground,
+        table: ScreeningTable,
+        multiple: float,
+        levels: Array | None = None,
+        stances: ScreeningTable | None = None,
+        check: Callable[[], None] = go_on,
+    ) -> Self:
         """Return all lifts of a wall that may have a load factor of at least a multiple.
+
+        Parameters
+        ----------
+        ground : Ground
+        table : ScreeningTable
+        multiple : float
+        levels : ndarray, shape (B, L), optional
+            Larger multiples for some bodies and limbs in the air, so that fewer lifts are kept.
+        stances : ScreeningTable, optional
+            The directions that stances of four hands have to pass; those of ``table`` by default.
+        check : callable
+            Called again and again; what it raises ends the screening.
 
         Raises
         ------
         LimitError
             If there are too many.
-        DeadlineError
-            If the deadline passes first.
         """
         from planner.search.compiled_graph import NODE
 
         count, bodies, limbs = ground.reached.shape
         found, left = list[Indices](), SEARCH_SETTINGS.most_lifts
+        counts = np.zeros((bodies, limbs), dtype=np.intp)
         for body in range(bodies):
-            deadline.check("the lifts were screened")
-            go_on()
+            check()
             for lifted in range(limbs):
                 others = [limb for limb in range(limbs) if limb != lifted]
                 own = [ground.of(body, limb) for limb in others]
-                rows = table.passing(body, own, multiple, others, left)
+                least = multiple if levels is None else max(multiple, levels[body, lifted])
+                rows = table.passing(body, own, least, others, left)
                 apart = np.ones(len(rows), dtype=bool)
                 for i in range(len(others)):
                     for j in range(i):
                         apart &= ground.wall.apart[rows[:, i], rows[:, j]]
                 rows = rows[apart]
                 left -= len(rows)
+                counts[body, lifted] = len(rows)
                 key = np.full(len(rows), lifted, dtype=np.intp)
                 for column in rows.T:
                     key = key * count + column
@@ -194,6 +220,7 @@ class Lifts:
         return cls(
             ground=ground,
             table=table,
+            stances=table if stances is None else stances,
             multiple=multiple,
             tops=ground.tops(table),
             bodies=order % bodies,
@@ -202,6 +229,7 @@ class Lifts:
             starts=np.append(starts, len(order)),
             keys=keys,
             nodes=np.zeros(len(order), dtype=NODE),
+            counts=counts,
         )
 
     def __len__(self) -> int:
@@ -225,11 +253,24 @@ class Lifts:
             self.multiple * (1.0 - 0.1 * SEARCH_SETTINGS.exact),
         )
 
+    def ruled_out(self, members: Indices, directions: Array, held: Array) -> list[State]:
+        """Return the states of stances (n, L) that directions of their own rule out."""
+        on = np.ones((len(members), len(self.ground.wall.bodies)), dtype=bool)
+        for limb, column in enumerate(members.T):
+            on &= self.ground.reached[column, :, limb]
+        at, bodies = np.nonzero(on)
+        wrenches = self.table.needed(StanceIndices(bodies, members[at]))
+        need = (directions[at] * wrenches).sum(axis=1)
+        least = self.multiple * (1.0 - 0.1 * SEARCH_SETTINGS.exact)
+        out = (held[at] < least * need) & (held[at] < self.tops[bodies] * need)
+        rows = zip(bodies[out].tolist(), members[at[out]].tolist(), strict=True)
+        return [State(body, tuple(row)) for body, row in rows]
+
     def expand(self, chosen: Indices, side: int) -> tuple[Indices, Indices]:
         """Look at the neighbours of lifts, as `compiled_graph.expand` describes."""
         from planner.search.compiled_graph import expand
 
-        ground, few = self.ground, SEARCH_SETTINGS.stance_directions
+        ground = self.ground
         placements, first = ground.candidates
         return expand(
             self.nodes,
@@ -245,8 +286,8 @@ class Lifts:
             np.ascontiguousarray(ground.wall.apart),
             ground.end_masks,
             ground.fixed,
-            self.table.directions[:few],
-            self._few_supports,
+            self.stances.directions,
+            self.stances.supports,
             self.table.wrenches,
             self.table.moments,
             self.tops,
@@ -282,10 +323,6 @@ class Lifts:
         from planner.search.compiled_graph import hash_table
 
         return hash_table(self.keys)
-
-    @cached_property
-    def _few_supports(self) -> Array:
-        return np.ascontiguousarray(self.table.supports[:, : SEARCH_SETTINGS.stance_directions])
 
 
 def _masks(table: NDArray[np.bool_]) -> Indices:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from planner.screening import ScreeningTable, StanceIndices, solve_stance
@@ -53,7 +55,7 @@ class Programs:
     def __init__(self, table: ScreeningTable) -> None:
         self._table = table
         self._parts = list[Solved]()
-        self._stances = dict[State, float]()
+        self._stances = dict[State, tuple[float, Array, float]]()
         self.count = 0
 
     def solve(self, bodies: Indices, members: Indices) -> Solved:
@@ -87,12 +89,25 @@ class Programs:
         self._parts.append(found)
         return found
 
+    def stances(self, states: Sequence[State]) -> Array:
+        """Return the load factors of states, shape (n,); those that are not known are solved."""
+        new = [each for each in dict.fromkeys(states) if each not in self._stances]
+        if new:
+            bodies, members = (np.array(column) for column in zip(*new, strict=True))
+            found = self.solve(bodies, members)
+            rows = zip(found.factors.tolist(), found.directions, found.held.tolist(), strict=True)
+            self._stances.update(zip(new, rows, strict=True))
+        return np.array([self._stances[each][0] for each in states])
+
     def stance(self, state: State) -> float:
         """Return the load factor of one state."""
-        if state not in self._stances:
-            found = self.solve(np.array([state.body]), np.array([state.members]))
-            self._stances[state] = float(found.factors[0])
-        return self._stances[state]
+        return float(self.stances([state])[0])
+
+    def bounding(self, states: Sequence[State], chosen: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Return the directions (n, 6) of some known states, and the sums of supports in them."""
+        rows = [self._stances[each] for each, wanted in zip(states, chosen, strict=True) if wanted]
+        directions = np.array([row[1] for row in rows]).reshape(-1, 6)
+        return directions, np.array([row[2] for row in rows])
 
     @property
     def known(self) -> Solved:

@@ -7,9 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hand_models.base import InvalidInputError, LimitError, go_on
+from hand_models.base import Array, InvalidInputError, go_on
 from planner import deadline
-from planner.screening import StanceIndices, solve_stance
+from planner.deadline import DeadlineError
+from planner.screening import ScreeningTable, StanceIndices, solve_stance
 from planner.search.deciding import Blocked, Decision
 from planner.search.found import Found, Proof
 from planner.search.learning import learnt, some_lifts
@@ -47,7 +48,8 @@ def search(
         Least load factor that is enough, and without which none counts; by default the best climb
         is looked for.
     seconds : float, optional
-        Time after which the search ends with what it has [s].
+        Time after which the search ends with what it has, as it does at a deadline of
+        `planner.deadline` [s].
     blocked : frozenset of pairs of State
         Moves that may not be made, which the climb goes round: a state and the next, or the one
         after it. A state twice may not be passed. The bound is that of the statics all the same.
@@ -60,14 +62,16 @@ def search(
         If ``within``, ``at_least`` or ``seconds`` is out of range.
     LimitError
         If too many lifts would have to be kept before any climb is found.
-    DeadlineError
-        If the deadline passes first.
     """
     for name, value in (("within", within), ("at_least", at_least), ("seconds", seconds)):
         if value is not None and not 0.0 <= value < np.inf:
             raise InvalidInputError(f"must be at least 0, got {value:g}", field=name)
     search_of = _Search(wall, (start, goal), blocked, progress, seconds)
     return search_of.found(within, at_least)
+
+
+class _TimeOverError(Exception):
+    """The time of the search itself is over."""
 
 
 class _Search:
@@ -81,7 +85,7 @@ class _Search:
         progress: SearchProgress | None,
         seconds: float | None,
     ) -> None:
-        self._started = time.perf_counter()
+        self._started, self._said, self._phase = time.perf_counter(), -np.inf, ""
         self._end = np.inf if seconds is None else self._started + seconds
         self._ground, self._blocked, self._progress = Ground(wall, ends), blocked, progress
         self._table, self._programs = wall.screening, Programs(wall.screening)
@@ -89,20 +93,28 @@ class _Search:
         self._least, self._bound = -np.inf, np.inf
         self._proof: Proof | None = None
         self._lifts = self._relearnt = 0
-        self._open: Decision | None = None
+        bodies, limbs = wall.reach.entry.shape[1:]
+        self._levels = np.full((bodies, limbs), -np.inf)
         self._ceiling = self._tried = np.inf
 
     def found(self, within: float, at_least: float | None) -> Found:
         """Run the search to its end, or till time is over."""
+        try:
+            return self._answer(self._finished(within, at_least))
+        except (DeadlineError, _TimeOverError):
+            return self._answer(False)
+
+    def _finished(self, within: float, at_least: float | None) -> bool:
+        """Search until the climb is as good as asked for, or proven to be the best."""
         settings = SEARCH_SETTINGS
         self._learn()
         if at_least is not None:
             self._ceiling = np.inf
-        while not self._late():
+        while True:
             best = max(self._least, 0.0)
             enough = at_least is not None and self._least >= at_least * (1.0 - settings.exact)
             if enough or self._ceiling <= best * (1.0 + within) * (1.0 + 2.0 * settings.exact):
-                return self._answer(True)
+                return True
             decided = self._decide(self._next(at_least))
             if decided.route:
                 self._states = decided.route
@@ -110,10 +122,10 @@ class _Search:
             elif decided.exhausted:
                 multiple = decided.multiple if decided.multiple > 0.0 else -np.inf
                 # below the least load factor that is asked for, nothing counts
-                self._ceiling = -np.inf if multiple == at_least else multiple
-                if not decided.hindered:
-                    self._prove(decided, multiple)
-        return self._answer(False)
+                if not decided.partial:
+                    self._ceiling = -np.inf if multiple == at_least else multiple
+                    if not decided.hindered:
+                        self._prove(decided, multiple)
 
     def _next(self, at_least: float | None) -> float:
         """Return the least load factor that is tried next."""
@@ -125,20 +137,24 @@ class _Search:
             multiple = min(settings.step * self._ceiling, self._tried)
             multiple *= settings.first_step if below else 1.0
             return multiple if multiple > settings.lowest else 0.0
-        if self._open is not None and self._least < self._open.multiple < self._ceiling:
-            return self._open.multiple
         if self._ceiling < self._least * (1.0 + settings.ratchet):
             return self._least * (1.0 + settings.exact)
         return float(np.sqrt(self._least * self._ceiling))
 
-    def _late(self) -> bool:
+    def _check(self) -> None:
+        """Break the search off when time is over, and say now and then how far it is."""
         deadline.check("the best climb was found")
         go_on()
-        return time.perf_counter() >= self._end
+        now = time.perf_counter()
+        if now >= self._end:
+            raise _TimeOverError
+        if self._progress is not None and now >= self._said + SEARCH_SETTINGS.silence:
+            self._said = now
+            self._progress(self._phase, self._least, self._bound, self._programs.count)
 
     def _report(self, phase: str) -> None:
-        if self._progress is not None:
-            self._progress(phase, self._least, self._bound, self._programs.count)
+        self._phase, self._said = phase, -np.inf
+        self._check()
 
     def _learn(self) -> None:
         """Learn directions from lifts of the whole wall, then from those that these leave."""
@@ -146,7 +162,7 @@ class _Search:
         self._report("directions")
         lifts = some_lifts(self._ground, settings.samples, 0)
         half = settings.directions // 2
-        self._table = learnt(self._table, self._programs, lifts, half)
+        self._table = learnt(self._table, self._programs, lifts, half, self._check)
         bounds = self._table.bounds(lifts)
         self._bound = self._ceiling = float(np.max(self._ground.tops(self._table), initial=0.0))
         self._tried = float(np.max(bounds, initial=0.0))
@@ -158,29 +174,52 @@ class _Search:
 
         Before the first climb is known, it is also left open after some steps, for a lower one.
         """
-        decision, steps = self._open, np.inf
-        if decision is None or decision.multiple != multiple:
-            self._report(f"lifts at {multiple:.3g}")
-            try:
-                lifts = Lifts.passing(self._ground, self._table, multiple)
-            except LimitError:
-                if decision is None:
-                    raise
-            else:
-                self._lifts = len(lifts)
-                decision = Decision(lifts, self._programs, self._blocked)
-                if not self._states and multiple > 0.0:
-                    steps = SEARCH_SETTINGS.first_steps
-        assert decision is not None
-        self._open, self._tried = decision, multiple
+        self._tried = multiple
+        steps = np.inf if self._states or multiple == 0.0 else SEARCH_SETTINGS.first_steps
+        if np.isfinite(self._levels).any():
+            # a part of the lifts first: where there are many, those that look best
+            decision = self._run(multiple, self._levels, steps)
+            if decision.route or not self._states and multiple > 0.0:
+                return decision
+        return self._run(multiple, None, steps)
+
+    def _run(self, multiple: float, levels: Array | None, steps: float) -> Decision:
+        """Look for a climb among all lifts, or among those that pass at higher levels."""
+        self._report(f"lifts at {multiple:.3g}")
+        stances = self._stance_table(multiple)
+        lifts = Lifts.passing(self._ground, self._table, multiple, levels, stances, self._check)
+        self._lifts = len(lifts)
+        many = lifts.counts > SEARCH_SETTINGS.many
+        self._levels[many] = np.maximum(self._levels[many], multiple)
+        # all lifts: stances are solved where both ends meet, and on all ways only if some fail there
+        attempts = 0.0 if levels is None else float(SEARCH_SETTINGS.attempts)
         self._report(f"climbs at {multiple:.3g}")
-        while not decision.ended and steps > 0 and not self._late():
+        decision = Decision(lifts, self._programs, self._blocked, attempts)
+        while not decision.ended and steps > 0:
+            self._check()
             decision.advance()
             steps -= 1
-        if decision.ended:
-            self._open = None
+            if decision.stuck:
+                lifts.nodes[:] = 0
+                attempts = np.inf if levels is None else attempts
+                barred = decision.barred
+                decision = Decision(lifts, self._programs, self._blocked, attempts, barred)
+                decision.hindered = len(barred) > 0
+        decision.partial = levels is not None
         self._relearn(multiple)
         return decision
+
+    def _stance_table(self, multiple: float) -> ScreeningTable:
+        """Return the directions that rule out most stances of four hands."""
+        known, settings = self._programs.known, SEARCH_SETTINGS
+        low = (known.factors < multiple) & known.directions.any(axis=1)
+        some = np.flatnonzero((known.members >= 0).all(axis=1) & low)[-settings.examples :]
+        table = self._table
+        if len(some):
+            offered = known.directions[some[:: 1 + len(some) // settings.offered]]
+            stances = StanceIndices(known.bodies[some], known.members[some])
+            table = table.extended(offered).reordered(stances, multiple)
+        return table.first(settings.stance_directions)
 
     def _relearn(self, multiple: float) -> None:
         """Add those directions of lifts just solved that rule out most of them."""
@@ -204,7 +243,7 @@ class _Search:
         self._bound = multiple
         self._proof = Proof(
             multiple=decided.multiple,
-            directions=self._table.directions,
+            directions=decided.directions,
             members=known.members[bounding],
             own=known.directions[bounding],
             backward=decided.exhausted == 2,

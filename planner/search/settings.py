@@ -27,6 +27,12 @@ class SearchSettings:
     """Part of a multiple that was too much, which is tried next."""
     lowest: float = 0.1
     """Multiple below which the next that is tried is zero."""
+    many: int = 500
+    """Lifts of a body and a limb in the air from which on only the best are kept at first."""
+    silence: float = 1.0
+    """Time between two reports of progress [s]."""
+    attempts: int = 3
+    """Parents of a lift that are tried over four hands while only the best lifts are kept."""
     few: int = 500
     """Programs from which at least directions of all states are learnt anew."""
     offered: int = 600

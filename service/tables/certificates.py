@@ -29,8 +29,9 @@ def print_certificate(
     places, bodies, limbs = claimed.reached.shape
     begin, end = ("goal", "start") if claimed.backward else ("start", "goal")
     ways = len(claimed.directions) + len(claimed.own_directions)
+    claim = f"no climb has a least load factor of {claimed.multiple:.6g} or more"
     rows = [
-        ("bound", f"no climb has a least load factor of {claimed.multiple:.6g} or more"),
+        ("bound", claim if claimed.multiple else "there is no climb, whatever its load factor"),
         (
             "rests on",
             f"{places} placements, {bodies} bodies, {limbs} limbs, {claimed.reached.sum():,} of "

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from hand_models.base import LimitError
 from planner.certification import check_bound
 from tests.suite.helpers.certificates import (
     at_end,
@@ -193,6 +194,12 @@ def test_a_climb_from_a_stance():
     reached = climb.reached.copy()
     reached[route[0][1][0], route[0][0], 0] = False
     assert check_bound(replace(proof_of(fixed, 0.1, answers), reached=reached)).proven
+
+
+def test_refuses_more_states_than_it_can_number():
+    climb = random_climb(1, placements=700, bodies=2, limbs=7, reach=0.0)
+    with pytest.raises(LimitError, match="700 placements, 2 bodies and 7 limbs"):
+        check_bound(climb)
 
 
 @pytest.mark.slow

@@ -57,6 +57,17 @@ def test_a_certificate_without_a_route(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["route"] is None
 
 
+def test_that_there_is_no_climb_is_said_so(tmp_path, capsys):
+    claimed, _ = certificate(1.01)
+    nowhere = replace(claimed, multiple=0.0, shifts=claimed.shifts[:0])
+    nowhere.write(tmp_path / "climb.npz")
+    assert run_command_line(["check", str(tmp_path / "climb.npz")]) == OVERLOADED
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "there is no climb, whatever its load factor" in printed
+    assert "ruled out proven route" in printed
+    assert "state 1 is not one move from the state before" in printed
+
+
 def test_a_file_that_is_none_is_bad_input(tmp_path, capsys):
     path = tmp_path / "climb.npz"
     np.savez(path, points=np.zeros(3))
