@@ -22,6 +22,15 @@ from .certification import (
     check_bound as check_bound,
     check_route as check_route,
 )
+from .climbs import (
+    ClimbProgress as ClimbProgress,
+    ClimbStatus as ClimbStatus,
+    DecidingStage as DecidingStage,
+    FoundClimb as FoundClimb,
+    Raise as Raise,
+    RefusedMoves as RefusedMoves,
+    find_climb as find_climb,
+)
 from .deadline import (
     DeadlineError as DeadlineError,
 )
@@ -41,6 +50,7 @@ from .pictures import (
     plot_redundancy as plot_redundancy,
     plot_route_survival as plot_route_survival,
     plot_survival as plot_survival,
+    plot_wall as plot_wall,
     plot_wrench_space as plot_wrench_space,
     summary as summary,
     write_report as write_report,
@@ -61,6 +71,7 @@ from .processes import (
     Workers as Workers,
     cores as cores,
     resident as resident,
+    send_part as send_part,
     starting_children as starting_children,
 )
 from .question import (
@@ -140,6 +151,11 @@ from .route import (
     stages as stages,
 )
 from .screening import Screened as Screened, screen as screen
+from .search import (
+    Ends as Ends,
+    Wall as Wall,
+    climb_certificate as climb_certificate,
+)
 from .simulation import find_survival as find_survival
 from .solving import (
     KnownStance as KnownStance,

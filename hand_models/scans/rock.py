@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from hand_models.base import Array, Indices, Pose, whole_file
-from hand_models.rock import FilledCells
+from hand_models.rock import FilledCells, Triangles
 from hand_models.scans.holes import Gaps, Hole, Step
 from hand_models.scans.scan import areas_of
 
@@ -74,8 +74,8 @@ class ScannedRock:
         return np.asarray(np.ptp(self.vertices, axis=0))
 
 
-def write_rock(rock: ScannedRock, path: Path) -> None:
-    """Write scanned rock to a PLY file with normals [m], which `read_mesh` can read for a hold."""
+def write_rock(rock: ScannedRock | Triangles, path: Path) -> None:
+    """Write rock to a PLY file with normals [m], which `read_mesh` can read for a hold."""
     vertices, faces = rock.vertices, rock.faces
     # a vertex's normal is the mean of its triangles', by area
     areas, corners = areas_of(vertices, faces), faces.T.ravel()

@@ -1,4 +1,5 @@
 from .body_plots import plot_body_space as plot_body_space
+from .climb_plots import plot_wall as plot_wall
 from .com_plots import plot_com_region as plot_com_region
 from .hand_plots import plot_wrench_space as plot_wrench_space
 from .opening_plots import plot_opening as plot_opening

@@ -1,4 +1,4 @@
-"""Pictures of a climb: the robot at each stage, margins along the time, and support regions."""
+"""Pictures of a climb: stages, margins along the time, support regions, and its wall."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import groupby, pairwise
+from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
@@ -16,17 +17,20 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from hand_models.base import Array, InvalidInputError
+from hand_models.base import Array, InvalidInputError, Pose, whole_file
+from hand_models.rock import Mesh
 from planner.capability import BodySpace, com_region
+from planner.climbs import FoundClimb
 from planner.pictures.body_plots import draw_polygon
 from planner.pictures.com_plots import axis_words
 from planner.pictures.plan_scene import WORLD_UP, drawn_scene, view_directions
 from planner.pictures.plan_views import UTILISATION_COLOURS, UTILISATION_NORM, View, draw_scene
 from planner.pictures.settings import PICTURE_SETTINGS
+from planner.programs import WRENCH_UNIT
 from planner.result import Plan
 from planner.route import Climb, Knot, KnotPhase, RouteResult
 
-__all__ = ["draw_climb", "draw_support"]
+__all__ = ["draw_climb", "draw_support", "plot_wall"]
 
 
 def draw_climb(climb: Climb, result: RouteResult) -> Figure:
@@ -141,6 +145,86 @@ def draw_support(climb: Climb, result: RouteResult) -> Figure | None:
         parse_math=False,
     )
     return figure
+
+
+def plot_wall(found: FoundClimb, rock: Mesh, rock_pose: Pose, path: Path) -> None:
+    """Draw a wall's placements by what they carry, the climb on them, and its load factors.
+
+    Parameters
+    ----------
+    found : FoundClimb
+    rock : Mesh
+        Its frame has x up the rock and z into it.
+    rock_pose : Pose
+        Of that frame in W.
+    path : Path
+        Picture file; its suffix is the format.
+    """
+    wall, into_rock = found.wall, rock_pose.inverse()
+
+    def flat(poses: Sequence[Pose]) -> Array:
+        """Return positions across and up the rock, (n, 2) [m]."""
+        places = np.array([pose.position for pose in poses]).reshape(-1, 3)
+        return np.asarray(into_rock.apply(places)[:, [1, 0]])
+
+    figure = Figure(figsize=(13.0, 7.5), layout="constrained")
+    axes, lower = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
+    vertices = rock.triangles.vertices
+    axes.hexbin(
+        *vertices[:, [1, 0]].T, C=-vertices[:, 2], gridsize=150, cmap="gray", alpha=0.6, zorder=0
+    )
+    up = np.eye(6)[2:3]
+    lifts = wall.screening.hands.supports(up)[:, 0] * WRENCH_UNIT[2]
+    places = flat([each.pose for each in wall.places])
+    shown = axes.scatter(
+        *places.T, c=lifts, cmap="viridis", s=26, edgecolors="white", linewidths=0.4
+    )
+    figure.colorbar(shown, ax=axes, label="largest force upward of a hand [N]", shrink=0.8)
+    axes.plot(*flat(wall.bodies).T, ".", color="0.2", markersize=2, label="poses of the body")
+    climb, deciding = found.climb, found.deciding
+    if climb is not None:
+        for i, limb in enumerate(wall.robot.limbs):
+            route = climb.route
+            hands = [*route.start.hands, *(move.hand for move in route.moves)]
+            own = flat([hand.pose for hand in hands if hand.limb == limb])
+            style: dict[str, Any] = {"color": f"C{i}", "markersize": 9, "markerfacecolor": "none"}
+            axes.plot(*own.T, "o-", label=limb.replace("_", " "), **style)
+        bodies = flat([knot.body for knot in climb.knots])
+        axes.plot(*bodies.T, "--", color="black", linewidth=1.2, label="the body")
+        axes.plot(*bodies[0], "s", color="black", markersize=5)
+    if deciding is not None:
+        at = flat([wall.places[place].pose for place in deciding.placements.values()])
+        axes.plot(*at.T, "*", color="tab:red", markersize=13, label="hands of the deciding stage")
+        axes.plot(*flat([wall.bodies[deciding.body]]).T, "P", color="tab:red", markersize=8)
+    axes.set(aspect="equal", xlabel="across [m]", ylabel="up the rock [m]")
+    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=4, frameon=False)
+    _draw_factors(lower, found)
+    figure.suptitle(f"{len(wall.places)} placements, {len(wall.bodies)} poses of the body")
+    with whole_file(path) as part:
+        figure.savefig(part, format=path.suffix[1:].lower(), dpi=120)
+
+
+def _draw_factors(axes: Any, found: FoundClimb) -> None:
+    """Draw the load factors of a climb's states and stages, and the bound of other climbs."""
+    if math.isfinite(found.bound):
+        label = f"no climb has more in all stages: {found.bound:.3f}"
+        axes.axhline(found.bound, color="tab:red", linestyle="--", label=label)
+    if found.result is not None:
+        factors = [p.load_factor for p in found.result.plans]
+        known = [np.nan if factor is None else factor for factor in factors]
+        axes.plot(known, ".-", color="black", label="stages as planned")
+    if found.deciding is not None:
+        here = found.deciding.stage, found.deciding.load_factor
+        axes.plot(*here, "*", color="tab:red", markersize=13, label=f"decides: {here[1]:.3f}")
+    if found.result is None:
+        said = {"none": "proven: there is no climb", "blocked": "no moves of a climb have a plan"}
+        axes.text(0.5, 0.5, said.get(found.status, "no climb was found in time"), ha="center")
+    axes.axhline(1.0, color="0.6", linewidth=0.8)
+    axes.set(xlabel="stage", ylabel="load factor [1]", title=found.status.replace("_", " "))
+    axes.set_ylim(bottom=0.0)
+    axes.grid(alpha=0.3)
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(fontsize=8)
 
 
 def _draw_margins(axes: Any, climb: Climb) -> None:

@@ -188,7 +188,9 @@ def _sentence(stage: RouteStage, plan: Plan | OutOfReach) -> str:
     limb = str(stage.limb).replace("_", " ")
     what = {
         "start": "the start stance",
-        "shift": f"move {stage.move}, shifting the body before {limb} lifts",
+        "shift": f"move {stage.move}, shifting the body before {limb} lifts"
+        if stage.limb
+        else "the shift of the body at the end",
         "lift": f"move {stage.move}, with {limb} in the air",
         "place": f"move {stage.move}, with {limb} on its new hold",
     }[stage.phase]

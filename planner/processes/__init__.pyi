@@ -3,6 +3,7 @@ from .worker_handles import (
     PriorityLane as PriorityLane,
     WorkerHandle as WorkerHandle,
     resident as resident,
+    send_part as send_part,
     starting_children as starting_children,
 )
 from .workers import (

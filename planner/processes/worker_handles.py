@@ -16,7 +16,9 @@ import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from types import FrameType
@@ -29,6 +31,7 @@ __all__ = [
     "ProcessSettings",
     "WorkerHandle",
     "resident",
+    "send_part",
     "starting_children",
 ]
 
@@ -37,6 +40,8 @@ Output = TypeVar("Output")
 
 Make = Callable[[], Callable[[Input], Output]]
 """Factory that is called once in a worker and returns the function that answers questions."""
+
+_sender: ContextVar[Callable[[object], None] | None] = ContextVar("_sender", default=None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +114,7 @@ class PriorityLane(Generic[Input, Output]):
         self.pipe.close()
 
     def take(self) -> Output | None:
-        """Return the next answer of the worker, if all of it has arrived.
+        """Return the next answer of the worker, if all of it has arrived, or what `send_part` sent.
 
         To be called when the pipe has data. Never waits for the rest of an answer.
 
@@ -226,6 +231,16 @@ def resident(pid: int | None) -> int | None:
         return None
 
 
+def send_part(part: object) -> None:
+    """Send a part of the answer on which this thread of a worker is at work, before the answer.
+
+    The process that asked gets parts by `PriorityLane.take`, as it gets answers, and must be able
+    to tell them apart. In other threads and processes nothing is sent.
+    """
+    if (send := _sender.get()) is not None:
+        send(part)
+
+
 def _answer_each(pipes: list[Connection], memory: int | None, stays: bool) -> None:
     """Answer what comes through pipes until their other ends are gone: a process's whole run."""
     _begin_child(stays=stays)
@@ -250,6 +265,7 @@ def _answer_each(pipes: list[Connection], memory: int | None, stays: bool) -> No
 
 def _lane(answer: Callable[[Any], Any], pipe: Connection) -> None:
     """Answer what comes through one pipe."""
+    _sender.set(partial(_send_parts, pipe))
     with suppress(EOFError, OSError):
         _send_parts(pipe, None)
         while True:

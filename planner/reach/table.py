@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, Pose, go_on, stored
 from planner import deadline
-from planner.motion import CollisionScene
+from planner.motion import CollisionScene, Rock, distances_from_rock
 from planner.reach.limb_chain import LimbChain
 from planner.reach.settings import REACH_SETTINGS
 from planner.reach.starts import Starts
-from planner.robots import Robot
+from planner.robots import Robot, scene_number
 
 __all__ = ["ReachTable", "reach_poses", "reach_table"]
 
-Fits = Callable[[Array], NDArray[np.bool_]]
-"""Says which of some joint angles (S, n) are wanted, (S,)."""
+Fits = Callable[[Array, Indices], NDArray[np.bool_]]
+"""Says which of some joint angles (S, n) of the poses with indices (S,) are wanted, (S,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ def reach_poses(
     branches : int
         Most solutions of a pose; two of them differ by more than `ReachSettings.alike` in a joint.
     fits : callable, optional
-        Says which joint angles (S, n) may be returned, (S,); all by default.
+        Says which joint angles (S, n) of which poses (S,) may be returned; all by default.
 
     Returns
     -------
@@ -173,7 +173,7 @@ def reach_poses(
             solved = np.arange(most) < found[:, None]
             owners, flat = np.repeat(some, found), angles[solved]
             if fits is not None and len(flat):
-                good = fits(flat)
+                good = fits(flat, owners)
                 owners, flat = owners[good], flat[good]
             if most > branches:
                 # the first ones of each pose
@@ -197,10 +197,11 @@ def reach_table(
     branches: int = REACH_SETTINGS.branches,
     limbs: Sequence[str] | None = None,
     clear: bool = True,
+    rock: Rock | None = None,
 ) -> ReachTable:
     """Return which placements a robot's hands reach from which poses of its body.
 
-    Rock and the other limbs are not looked at.
+    The other limbs are not looked at.
 
     Parameters
     ----------
@@ -216,6 +217,9 @@ def reach_table(
     clear : bool
         Whether solutions are left out in which the capsules of a limb and its hand meet those of
         the body, or each other.
+    rock : Rock, optional
+        Solutions are left out in which the capsules of a limb are in this rock, or nearer to it
+        than hands at their holds may be; the last links with the hand may touch it.
 
     Raises
     ------
@@ -230,7 +234,10 @@ def reach_table(
     scene = CollisionScene(robot, ())
     for i, limb in enumerate(names):
         chain, starts = _limb_postures(robot, limb)
-        fits = _clear_of_itself(scene, limb) if clear else None
+        filters = [_clear_of_itself(scene, limb)] if clear else []
+        if rock is not None:
+            filters.append(_clear_of_rock(scene, limb, rock, bodies))
+        fits = _all_of(filters) if filters else None
         angles, count = reach_poses(chain, starts, targets, branches, fits)
         found.append(angles)
         counts[:, :, i] = count.reshape(shape[:2])
@@ -267,10 +274,50 @@ def _clear_of_itself(scene: CollisionScene, limb: str) -> Fits:
     pairs = np.searchsorted(mine, scene.pairs[within])
     radii, capsules = scene.radii[mine], scene.limbs[limb]
 
-    def fits(angles: Array) -> NDArray[np.bool_]:
+    def fits(angles: Array, _: Indices) -> NDArray[np.bool_]:
         body = np.broadcast_to(scene.body, (len(angles), *scene.body.shape))
         segments = np.ascontiguousarray(np.hstack([body, capsules.segments(angles)]))
         away = capsule_distances(segments, radii, pairs, 0.0)
         return np.asarray(away.min(axis=1, initial=0.0) >= 0.0)
+
+    return fits
+
+
+def _all_of(filters: Sequence[Fits]) -> Fits:
+    """Return a function that wants what all filters want; each is asked for what is left."""
+
+    def fits(angles: Array, owners: Indices) -> NDArray[np.bool_]:
+        found = np.ones(len(angles), dtype=bool)
+        for each in filters:
+            left = np.flatnonzero(found)
+            found[left] = each(angles[left], owners[left])
+        return found
+
+    return fits
+
+
+def _clear_of_rock(scene: CollisionScene, limb: str, rock: Rock, bodies: Sequence[Pose]) -> Fits:
+    """Return a function that says which joint angles keep a limb but its hand off the rock."""
+    capsules, own = scene.limbs[limb], scene.own[limb]
+    # the last joint moves the hand and what is next to it, which may touch
+    free = np.flatnonzero(capsules.steps < capsules.steps.max())
+    along = np.linspace(0.0, 1.0, 5)[:, None]
+    far = 0.5  # that a link is in the rock at most [m]
+    margin = scene_number("motion", "margin_at_hold")
+    into = [rock.pose.inverse() @ body for body in bodies]
+    turns, origins = (
+        np.array([at.rotation for at in into]),
+        np.array([at.position for at in into]),
+    )
+
+    def fits(angles: Array, owners: Indices) -> NDArray[np.bool_]:
+        segments = capsules.segments(angles)[:, free]
+        first, last = segments[:, :, None, 0], segments[:, :, None, 1]
+        points = (first + along * (last - first)).reshape(len(angles), -1, 3)
+        body = owners % len(bodies)
+        there = points @ turns[body].mT + origins[body, None]
+        away = distances_from_rock(rock.hold, np.ascontiguousarray(there.reshape(-1, 3)), far)
+        gaps = away.reshape(*segments.shape[:2], -1).min(axis=2) - scene.radii[own[free]]
+        return np.asarray(gaps.min(axis=1, initial=np.inf) >= margin)
 
     return fits

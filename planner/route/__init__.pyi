@@ -11,10 +11,11 @@ from .evaluation import evaluate as evaluate
 from .knots import (
     Climb as Climb,
     Failure as Failure,
-    HandKnot as HandKnot,
     Knot as Knot,
     KnotPhase as KnotPhase,
 )
+from .moving import closing_loads as closing_loads
+from .moving_hand import HandKnot as HandKnot
 from .settings import ClimbSettings as ClimbSettings
 from .survival import (
     RouteShare as RouteShare,

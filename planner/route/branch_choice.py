@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import islice
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import islice, product
 
 import numpy as np
 
@@ -23,10 +23,23 @@ from planner.question import HandOnHold
 from planner.robots import Robot, scene_number
 from planner.route.climb import Move, Route
 
-__all__ = ["ends_of_swing", "start_joints", "swing_to"]
+__all__ = [
+    "KnownBranches",
+    "bodies_until_lifted",
+    "candidates_on",
+    "ends_of_swing",
+    "start_joints",
+    "swing_to",
+]
+
+KnownBranches = Callable[[str, Pose, Pose], Array]
+"""Returns joint angles of a limb, shape (k, n) [rad], that are known to put its hand on a pose in W
+from a pose of the body; k may be zero."""
 
 
-def bodies_until_lifted(body: Pose, moves: Iterable[Move], limb: str) -> tuple[list[Pose], bool]:
+def bodies_until_lifted(
+    body: Pose, moves: Iterable[Move], limb: str, end: Pose | None = None
+) -> tuple[list[Pose], bool]:
     """Return poses of the body, in W, while a limb's hand stays on its hold, the present one first.
 
     Between those of the moves are some halfway. The second is whether the hand leaves its hold at
@@ -39,6 +52,8 @@ def bodies_until_lifted(body: Pose, moves: Iterable[Move], limb: str) -> tuple[l
     moves : iterable of Move
         The moves that are left; in that of the limb itself the body shifts before it lifts.
     limb : str
+    end : Pose, optional
+        Pose of the body after all moves.
     """
     found = [body]
     for move in moves:
@@ -46,6 +61,8 @@ def bodies_until_lifted(body: Pose, moves: Iterable[Move], limb: str) -> tuple[l
             found += [pose_between(found[-1], move.body, 0.5), move.body]
         if move.hand.limb == limb:
             return found, True
+    if end is not None:
+        found += [pose_between(found[-1], end, 0.5), end]
     return found, False
 
 
@@ -108,41 +125,6 @@ def lasting(
     yield from ((angles, False) for angles in near)
 
 
-def ends_of_swing(
-    scene: CollisionScene,
-    place: HandOnHold,
-    moves: Sequence[Move],
-    body: Pose,
-    joints: Mapping[str, Array],
-) -> list[list[Array]]:
-    """Return joint angles of a limb with its hand on its next hold [rad], the better kinds first.
-
-    First those that are clear until the limb lifts again, then those that keep but the margin of
-    hands at their holds; if there are none, those that are clear of nothing. The list is empty if
-    no joint angles were found.
-
-    Parameters
-    ----------
-    scene : CollisionScene
-    place : HandOnHold
-        The hand on its next hold.
-    moves : sequence of Move
-        Moves that are left.
-    body : Pose
-        Present pose of B in W.
-    joints : mapping of str to ndarray, shape (n,)
-        Angles of all limbs [rad].
-    """
-    limb, near, most = place.limb, joints[place.limb], 6
-    bodies, lifts = bodies_until_lifted(body, moves, limb)
-    found = candidates_on(scene.robot, limb, place.pose, bodies, near)
-    clear = lasting(scene, limb, place.pose, bodies, joints, found, lifts=lifts)
-    kinds: list[list[Array]] = [[], []]
-    for angles, whole in islice(clear, most):
-        kinds[0 if whole else 1].append(angles)
-    return [kind for kind in kinds if kind] or [kind for kind in [found[:most]] if kind]
-
-
 def candidates_on(
     robot: Robot, limb: str, hand: Pose, bodies: Sequence[Pose], near: Array
 ) -> list[Array]:
@@ -161,7 +143,61 @@ def candidates_on(
                 found.append(follow_poses(robot, limb, angles, inside[-2::-1])[-1])
             except BranchEndError:
                 continue
-    return sorted(found, key=lambda each: float(np.abs(each - near).max()))
+    return _nearest(found, near)
+
+
+def ends_of_swing(
+    route: Route,
+    done: int,
+    scene: CollisionScene,
+    body: Pose,
+    joints: Mapping[str, Array],
+    known: KnownBranches | None = None,
+) -> list[list[Array]]:
+    """Return joint angles with which the hand of a move may come to its new hold, by kinds [rad].
+
+    First those that are clear until the limb lifts again, or for as long as any are, then those
+    that keep but the margin of hands at their holds; if there are none, those that are clear of
+    nothing. The list is empty if no joint angles were found.
+
+    Parameters
+    ----------
+    route : Route
+    done : int
+        Number of the move, from one.
+    scene : CollisionScene
+    body : Pose
+        Pose of B in W.
+    joints : mapping of str to ndarray, shape (n,)
+        Present angles of all limbs [rad].
+    known : callable, optional
+        Angles that are tried before others are searched for.
+    """
+    limb, place = route.moves[done - 1].hand.limb, route.moves[done - 1].hand.pose
+    bodies, lifts = bodies_until_lifted(body, route.moves[done:], limb, route.end)
+    most, near = 6, joints[limb]
+    ready = [] if known is None else [*known(limb, body, place)]
+
+    def clear(angles: Sequence[Array], until: Sequence[Pose], leaves: bool) -> list[list[Array]]:
+        found = lasting(scene, limb, place, until, joints, angles, lifts=leaves)
+        kinds: list[list[Array]] = [[], []]
+        for each, whole in islice(found, most):
+            kinds[0 if whole else 1].append(each)
+        return [kind for kind in kinds if kind]
+
+    found = clear(ready, bodies, lifts)
+    if found:
+        return found
+    others = _nearest([*candidates_on(scene.robot, limb, place, bodies, near), *ready], near)
+    for until in (bodies, bodies[: (len(bodies) + 1) // 2], bodies[:1]):
+        found = clear(others, until, lifts and until is bodies)
+        if found:
+            return found
+    return [others[:most]] if others else []
+
+
+def _nearest(angles: Iterable[Array], near: Array) -> list[Array]:
+    return sorted(angles, key=lambda each: float(np.abs(each - near).max()))
 
 
 def swing_to(
@@ -195,7 +231,10 @@ def swing_to(
 
 
 def start_joints(
-    route: Route, scene: CollisionScene, found: Mapping[str, Array]
+    route: Route,
+    scene: CollisionScene,
+    found: Mapping[str, Array],
+    known: KnownBranches | None = None,
 ) -> dict[str, Array]:
     """Return joint angles of the start stance of limbs whose joints are to be found.
 
@@ -206,18 +245,46 @@ def start_joints(
     found : mapping of str to ndarray, shape (n,)
         Angles of all limbs, those to be found with low torques [rad]. They are kept where nothing
         better is found.
+    known : callable, optional
+        Angles that are tried before others are searched for.
     """
     joints, start = dict(found), route.start
+
+    def best(
+        hand: HandOnHold, angles: Sequence[Array], until: Sequence[Pose], leaves: bool
+    ) -> Array | None:
+        clear = lasting(scene, hand.limb, hand.pose, until, joints, angles, lifts=leaves)
+        return next((each for each, _ in clear), None)
+
+    if known is not None:
+        joints |= _clear_together(route, scene, joints, known)
     for place in start.hands:
         if place.limb not in start.solved_limbs:
             continue
-        limb, near = place.limb, found[place.limb]
-        whole, lifts = bodies_until_lifted(start.body, route.moves, limb)
-        others = [near, *candidates_on(scene.robot, limb, place.pose, whole, near)]
-        for until, leaves in ((whole, lifts), ([start.body], False)):
-            clear = lasting(scene, limb, place.pose, until, joints, others, lifts=leaves)
-            best = next(clear, None)
-            if best is not None:
-                joints[limb] = best[0]
-                break
+        limb, near = place.limb, joints[place.limb]
+        whole, lifts = bodies_until_lifted(start.body, route.moves, limb, route.end)
+        ready = [] if known is None else [*known(limb, start.body, place.pose)]
+
+        chosen = best(place, [near, *ready], whole, lifts)
+        if chosen is None:
+            others = [near, *candidates_on(scene.robot, limb, place.pose, whole, near), *ready]
+            chosen = best(place, others, whole, lifts)
+            if chosen is None:
+                chosen = best(place, others, [start.body], False)
+        if chosen is not None:
+            joints[limb] = chosen
     return joints
+
+
+def _clear_together(
+    route: Route, scene: CollisionScene, found: Mapping[str, Array], known: KnownBranches
+) -> dict[str, Array]:
+    """Return the first known angles of the start's limbs at which nothing meets; {} without any."""
+    start = route.start
+    hands = [hand for hand in start.hands if hand.limb in start.solved_limbs]
+    choices = [[*known(hand.limb, start.body, hand.pose)] for hand in hands]
+    for angles in product(*choices):
+        chosen = dict(zip((hand.limb for hand in hands), angles, strict=True))
+        if scene.nearest(start.body, {**found, **chosen}).distance >= 0.0:
+            return chosen
+    return {}

@@ -3,7 +3,7 @@
 A move takes one limb to its next hold. First the body may shift, with all hands on the rock. Then
 the limb lifts (a stance without that hand). Then the hand is placed on the new hold:
 
-    start → [shift] → lift → place → [shift] → lift → place → …
+    start → [shift] → lift → place → [shift] → lift → place → … → [shift]
 """
 
 from __future__ import annotations
@@ -72,6 +72,9 @@ class Route:
         Stance from which the climb starts.
     moves : tuple of Move
         Moves in climbing order.
+    end : Pose, optional
+        Pose of the body frame B in W to which the body shifts after all moves, with all hands on
+        the rock.
     load : Load
         Mass, payloads and acceleration of the body, the same in every stage.
     limits : Limits
@@ -90,6 +93,7 @@ class Route:
     name: str
     start: Stance
     moves: tuple[Move, ...]
+    end: Pose | None = field(default=None, kw_only=True)
     load: Load = field(default_factory=Load)
     limits: Limits = field(default_factory=Limits)
     objective: Objective = "max_margin"
@@ -107,11 +111,11 @@ class RouteStage:
     index : int
         Index of the stage from zero, in climbing order.
     move : int
-        Number of its move, from one; zero for the start.
+        Number of its move, from one; zero for the start, one more than there are moves for the end.
     phase : {'start', 'shift', 'lift', 'place'}
         Part of the move: shift of the body, lift of the limb, or place of its hand.
     limb : str or None
-        Limb that moves; None for the start.
+        Limb that moves; None for the start and the end.
     question : Question
         The stage's stance, load, limits and objective.
     paths : dict of str to str
@@ -307,6 +311,12 @@ def stages(route: Route) -> Iterator[RouteStage]:
             joints[limb] = given.get(limb, "solve")
         index += 1
         yield stage(number, "place", limb, list(hands.values()))
+    if route.end is not None:
+        body, body_field = route.end, "end"
+        if joints is not None:
+            joints |= dict.fromkeys(hands, "solve")
+        index += 1
+        yield stage(len(route.moves) + 1, "shift", None, list(hands.values()))
 
 
 def _joints_of(start: Stance) -> dict[str, JointAngles] | None:

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, takewhile
 
 import numpy as np
 from msgspec import structs
@@ -33,7 +33,7 @@ from planner.programs import CAP_SLACK
 from planner.question import HandOnHold, Objective
 from planner.robots import UnreachableError, scene_number, solve_limbs
 from planner.route.between import Passage
-from planner.route.branch_choice import ends_of_swing, start_joints, swing_to
+from planner.route.branch_choice import KnownBranches, ends_of_swing, start_joints, swing_to
 from planner.route.climb import Move, Route, stages
 from planner.route.first_checks import checked_stages, climb_scene, refuse
 from planner.route.held import (
@@ -56,6 +56,10 @@ def plan_climb(
     route: Route,
     settings: ClimbSettings | None = None,
     progress: Callable[[int, int], None] | None = None,
+    *,
+    known: KnownBranches | None = None,
+    after: Climb | None = None,
+    knots: Callable[[Sequence[Knot]], None] | None = None,
 ) -> Climb:
     """Plan a climb: knots from the start to its end, or to the move that fails.
 
@@ -70,8 +74,12 @@ def plan_climb(
         kinematics.
     settings : ClimbSettings, optional
         Rates of the controller; those of ``climb.toml`` by default.
-    progress : callable, optional
-        Called after each move with (number of moves planned, number of moves).
+    progress, knots : callable, optional
+        Called after each move with the numbers of moves planned and in all; with all knots so far.
+    known : callable, optional
+        Joint angles that are tried before others are searched for.
+    after : Climb, optional
+        Of the same start, load and limits: its knots are kept while moves are the same objects.
 
     Raises
     ------
@@ -83,21 +91,23 @@ def plan_climb(
     """
     # what is wrong with the route itself comes before what a climb cannot have
     tuple(stages(route))
-    solved = route
-    if route.start.joints is None:
-        solved = replace(route, start=replace(route.start, joints="solve"))
+    joints = "solve" if route.start.joints is None else route.start.joints
+    solved = replace(route, start=replace(route.start, joints=joints))
     refuse(solved)
     rates = (settings or ClimbSettings()).complete()
-    planner, failure = _Planner(solved, rates), None
+    planner, failure = _Planner(solved, rates, known), None
     try:
-        planner.begin()
-        for number, move in enumerate(route.moves, start=1):
+        begun = planner.begin() if after is None or not after.held else planner.branch_off(after)
+        for number, move in enumerate(route.moves[begun:], start=begun + 1):
             planner.move(number, move)
+            if knots is not None:
+                knots(planner.knots)
             if progress is not None:
                 progress(number, len(route.moves))
+        planner.end()
     except _BlockedError as blocked:
         failure = blocked.failure
-    return Climb(route, tuple(planner.knots), failure, structs.asdict(rates))
+    return Climb(route, tuple(planner.knots), failure, structs.asdict(rates), tuple(planner.held))
 
 
 class _BlockedError(Exception):
@@ -116,22 +126,24 @@ def _in_the_way(met: NearestPair) -> NoPlanError:
 class _Planner:
     """A climb as far as it is planned.
 
-    Parameters
-    ----------
-    route : Route
-    settings : ClimbSettings
-        Rates, all of them given.
+    The parameters are those of `plan_climb`, with all rates given.
 
     Attributes
     ----------
     knots : list of Knot
+    held : list of HeldPosture
+        At the start and after each move.
     """
 
     _at: HeldPosture
 
-    def __init__(self, route: Route, settings: ClimbSettings) -> None:
+    def __init__(
+        self, route: Route, settings: ClimbSettings, known: KnownBranches | None = None
+    ) -> None:
         self.knots: list[Knot] = []
-        self._route, self._settings, self._numbers = route, settings, KnotNumbers.bundled()
+        self.held: list[HeldPosture] = []
+        self._route, self._settings, self._known = route, settings, known
+        self._numbers = KnotNumbers.bundled()
         self._stages = checked_stages(route)
         self._scene = climb_scene(route)
         self._stage = self._move = 0
@@ -141,17 +153,38 @@ class _Planner:
 
     # Parts of a climb ---------------------------------------------------------------------------
 
-    def begin(self) -> None:
-        """Plan the start stance."""
+    def begin(self) -> int:
+        """Plan the start stance; return the number of moves that are planned."""
         stance = self._route.start
         with self._in("start"):
             where = posture(self._stages[0].question)
             assert where is not None
-            angles = start_joints(self._route, self._scene, where.angles)
-            self._require_clear(stance.body, angles)
+            angles = start_joints(self._route, self._scene, where.angles, self._known)
+            nearest = self._scene.nearest(stance.body, angles)
+            if nearest.distance < 0.0:
+                raise NoPlanError(str(nearest))
             posed = Posed(self._route, stance.hands, stance.body, angles)
             self._at = self._plan(posed, stage=True)
         self._append(self._at, None, stage=True)
+        self.held.append(self._at)
+        return 0
+
+    def branch_off(self, other: Climb) -> int:
+        """Keep what another climb has of the same moves; return their number."""
+        pairs = zip(self._route.moves, other.route.moves[: len(other.held) - 1], strict=False)
+        same = sum(1 for _ in takewhile(lambda pair: pair[0] is pair[1], pairs))
+        self.knots = [knot for knot in other.knots if knot.move <= same]
+        self.held = [*other.held[: same + 1]]
+        self._at = self.held[-1]
+        self._stage = sum(knot.stage is not None for knot in self.knots)
+        return same
+
+    def end(self) -> None:
+        """Shift the body to where it is to be after all moves."""
+        self._move, self._limb = len(self._route.moves) + 1, None
+        if self._route.end is not None:
+            with self._in("shift"):
+                self._shift(self._route.end)
 
     def move(self, number: int, move: Move) -> None:
         """Plan one move."""
@@ -170,6 +203,7 @@ class _Planner:
             self._follow(states)
         with self._in("load"):
             self._load(whole, move.hand.limb)
+        self.held.append(self._at)
 
     def _shift(self, goal: Pose) -> None:
         """Shift the body on all hands."""
@@ -213,12 +247,6 @@ class _Planner:
                 raise
             raise _in_the_way(met) from error
 
-    def _require_clear(self, body: Pose, angles: Mapping[str, Array]) -> None:
-        """Refuse a posture in which a link is in rock or in another."""
-        nearest = self._scene.nearest(body, angles)
-        if nearest.distance < 0.0:
-            raise NoPlanError(str(nearest))
-
     def _unload(self, limb: str) -> list[MovingHand]:
         """Take the load off the leaving hand; return its states while it opens."""
         held = self._at
@@ -254,16 +282,16 @@ class _Planner:
     def _swing(self, move: Move) -> None:
         """Swing the hand from its old hold to the new one."""
         posed, limb = self._at.posed, move.hand.limb
-        robot, target = self._route.start.robot, posed.body.inverse() @ move.hand.pose
         given = None if isinstance(move.joints, str) else move.joints.get(limb)
-        left = self._route.moves[self._move :]
-        kinds = (
-            [[given]]
-            if isinstance(given, np.ndarray)
-            else ends_of_swing(self._scene, move.hand, left, posed.body, posed.angles)
-        )
+        kinds: Sequence[Sequence[Array]]
+        if isinstance(given, np.ndarray):
+            kinds = [[given]]
+        else:
+            here = self._route, self._move, self._scene, posed.body, posed.angles
+            kinds = ends_of_swing(*here, self._known)
         if not kinds:
-            solve_limbs(robot, {limb: target}, {}, np.zeros(3))
+            target = posed.body.inverse() @ move.hand.pose
+            solve_limbs(self._route.start.robot, {limb: target}, {}, np.zeros(3))
             raise NoPlanError(f"no joint angles were found for {limb} on its new hold")
         way = swing_to(self._scene, posed.body, posed.angles, limb, kinds)
         assert posed.moving is not None

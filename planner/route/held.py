@@ -21,8 +21,7 @@ from planner.result import LimitName, LoadRecovery, PlanArrays
 from planner.robots import LinkTree
 from planner.route.climb import Route
 from planner.route.hold_rows import HoldRows
-from planner.route.knots import HandKnot
-from planner.route.moving_hand import MovingHand
+from planner.route.moving_hand import HandKnot, MovingHand
 from planner.solving import Checks, Solution, Verified, answer_on, idle_joints
 from planner.verification import Check
 

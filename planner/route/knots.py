@@ -8,48 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from hand_models.base import Array, Pose, wrench_transport
+from hand_models.base import Array, Pose
 from planner.result import LimitName
 from planner.route.climb import Route
+from planner.route.moving_hand import HandKnot
 
-__all__ = ["Climb", "Failure", "HandKnot", "Knot", "KnotPhase"]
+if TYPE_CHECKING:
+    from planner.route.held import HeldPosture
+
+__all__ = ["Climb", "Failure", "Knot", "KnotPhase"]
 
 KnotPhase = Literal["start", "shift", "unload", "open", "swing", "close", "load"]
 """Part of a move that a knot ends: the body shifts, the leaving hand is unloaded to its closing
 tensions, opens, swings, closes on its new hold, and is loaded."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class HandKnot:
-    """A hand at a knot.
-
-    Attributes
-    ----------
-    limb : str
-    pose : Pose
-        Pose of the hand frame H in the world frame W.
-    on_rock : bool
-        Whether the hand touches its hold.
-    tensions, winch_angles : ndarray, shape (4,)
-        Tension [N] and winch angle [rad] of each tendon.
-    wrench : ndarray, shape (6,)
-        Wrench of the hand on the rock, in H [N, N·m]; zero in the air.
-    """
-
-    limb: str
-    pose: Pose
-    on_rock: bool
-    tensions: Array
-    winch_angles: Array
-    wrench: Array
-
-    @cached_property
-    def wrench_in_world(self) -> Array:
-        """Wrench of the rock on the hand, in W about its origin, shape (6,) [N, N·m]."""
-        return -(wrench_transport(self.pose) @ self.wrench)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -61,11 +34,11 @@ class Knot:
     index : int
         From zero, in climbing order.
     move : int
-        Number of the move, from one; zero for the start.
+        Number of the move, from one; zero for the start, one more than there are moves for the end.
     phase : {'start', 'shift', 'unload', 'open', 'swing', 'close', 'load'}
         Part of the move that this knot ends, or is in.
     limb : str or None
-        Limb that moves; None for the start.
+        Limb that moves; None for the start and the end.
     stage : int or None
         Index of the route's stage that this knot is the plan of; None between stages.
     time : float
@@ -137,12 +110,16 @@ class Climb:
         Why the climb ends early; None if it runs from end to end.
     rates : mapping of str to float
         Rates of the controller on which the knots' times rest, by name, as of `ClimbSettings`.
+    held : tuple of HeldPosture
+        The robot as it is held at the start and after each move, where another climb can branch
+        off.
     """
 
     route: Route
     knots: tuple[Knot, ...]
     failure: Failure | None = None
     rates: Mapping[str, float] = field(default_factory=dict)
+    held: tuple[HeldPosture, ...] = ()
 
     @property
     def fails(self) -> bool:

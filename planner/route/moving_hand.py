@@ -1,16 +1,17 @@
-"""A hand of a climb beside those that hold the robot: it opens, closes or is in the air."""
+"""A hand of a climb: one that opens, closes or is in the air; and any hand at a knot."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from hand_models.base import Array, Pose
+from hand_models.base import Array, Pose, wrench_transport
 from planner.question import ForceCap
 from planner.result import LimitName
 
-__all__ = ["MovingHand"]
+__all__ = ["HandKnot", "MovingHand"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -64,3 +65,33 @@ class MovingHand:
             turn = body.rotation @ turn
         force, around = turn @ self.wrench[:3], np.abs(turn) @ beside
         return cap.use(force.tolist(), around.tolist())
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class HandKnot:
+    """A hand at a knot.
+
+    Attributes
+    ----------
+    limb : str
+    pose : Pose
+        Pose of the hand frame H in the world frame W.
+    on_rock : bool
+        Whether the hand touches its hold.
+    tensions, winch_angles : ndarray, shape (4,)
+        Tension [N] and winch angle [rad] of each tendon.
+    wrench : ndarray, shape (6,)
+        Wrench of the hand on the rock, in H [N, N·m]; zero in the air.
+    """
+
+    limb: str
+    pose: Pose
+    on_rock: bool
+    tensions: Array
+    winch_angles: Array
+    wrench: Array
+
+    @cached_property
+    def wrench_in_world(self) -> Array:
+        """Wrench of the rock on the hand, in W about its origin, shape (6,) [N, N·m]."""
+        return -(wrench_transport(self.pose) @ self.wrench)

@@ -110,9 +110,7 @@ def touching(
     return touched
 
 
-@compiled(
-    NODE, "i1", "i1", "i1", "i2", "f1", "f2", "f2", "f4", "f1", "f0"
-)
+@compiled(NODE, "i1", "i1", "i1", "i2", "f1", "f2", "f2", "f4", "f1", "f0")
 def rule_out(
     nodes: NDArray[np.void],
     bodies: Indices,

@@ -204,7 +204,9 @@ class Decision:
         while len(left) or len(loose):
             ways = [
                 self._way(side, *row)
-                for row in zip(parents[left].tolist(), left.tolist(), vias[left].tolist(), strict=True)
+                for row in zip(
+                    parents[left].tolist(), left.tolist(), vias[left].tolist(), strict=True
+                )
             ]
             self._solve_stances(ways if attempts else [])
             failed = loose.tolist()
@@ -270,8 +272,10 @@ class Decision:
 
     def _stance(self, way: Way) -> tuple[int, ...]:
         lift = way.before if way.before >= 0 else way.after
-        if way.before >= 0 and way.after >= 0 and self._lifts.triples[way.before] != (
-            self._lifts.triples[way.after]
+        if (
+            way.before >= 0
+            and way.after >= 0
+            and self._lifts.triples[way.before] != (self._lifts.triples[way.after])
         ):
             pair = self._lifts.members[self._lifts.triples[[way.before, way.after]]]
             return tuple(pair.max(axis=0).tolist())

@@ -121,6 +121,8 @@ class Programs:
                 np.zeros((0, 6)),
                 np.zeros(0),
             )
-            whole = [np.concatenate(columns) for columns in zip(*(self._parts or [none]), strict=True)]
+            whole = [
+                np.concatenate(columns) for columns in zip(*(self._parts or [none]), strict=True)
+            ]
             self._parts = [Solved(*whole)]
         return self._parts[0]

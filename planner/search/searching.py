@@ -179,7 +179,7 @@ class _Search:
         if np.isfinite(self._levels).any():
             # a part of the lifts first: where there are many, those that look best
             decision = self._run(multiple, self._levels, steps)
-            if decision.route or not self._states and multiple > 0.0:
+            if decision.route or (not self._states and multiple > 0.0):
                 return decision
         return self._run(multiple, None, steps)
 

@@ -21,6 +21,7 @@ from hand_models.fixed_wrist import HoldTrial, input_digests, wrench_space
 from hand_models.rock import Mesh
 from hand_models.tile import Surface
 from planner import deadline
+from planner.motion import Rock
 from planner.prepare import settle_each
 from planner.question import EARTH_GRAVITY, HandOnHold
 from planner.reach import ReachTable, reach_table
@@ -54,10 +55,13 @@ class Chunk(msgspec.Struct, omit_defaults=True):
         Hands to try at each of some points.
     poses : list of list of float
         Rows of (3, 4) arrays: axes and origins in W of hand frames to reach [1, m].
+    bodies : str
+        Digest of the poses of the body from which they are to be reached.
     """
 
     points: list[list[HoldTrial]] = []
     poses: list[list[float]] = []
+    bodies: str = ""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -101,13 +105,13 @@ class WallSource:
 
     @property
     def digest(self) -> str:
-        """Digest of all that the answers of chunks depend on, besides the questions."""
+        """Digest of all that the answers of chunks depend on, besides the questions.
+
+        What is known of placements stays so where only the bodies change.
+        """
         inputs = input_digests(self.rock, self.surface, self.robot.hand.table.sections)
         arrays = [self.rock_pose.position, self.rock_pose.rotation, np.asarray(self.gravity)]
-        more = [
-            part.tolist() for pose in self.more_bodies for part in (pose.position, pose.rotation)
-        ]
-        every = inputs, [each.tolist() for each in arrays], more, self.places.kept, self.bodies
+        every = inputs, [each.tolist() for each in arrays], self.places.kept
         return sha256(f"{every}{robot_digest(self.robot)}".encode()).hexdigest()
 
     def poses(self) -> BodyPoses:
@@ -140,7 +144,8 @@ class WallSource:
             found = best_places(hand, self.rock, self.surface, chunk.points, up, kept)
             return _written(_place_arrays(*found))
         poses = [Pose(row[:, 3], row[:, :3]) for row in np.reshape(chunk.poses, (-1, 3, 4))]
-        return _written(vars(reach_table(self.robot, poses, bodies)))
+        rock = Rock("the rock", self.rock, self.rock_pose, frozenset(self.robot.limbs))
+        return _written(vars(reach_table(self.robot, poses, bodies, rock=rock)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -225,10 +230,11 @@ def wall_of(
             field="places",
         )
     placed = time.perf_counter()
-    rows = [np.column_stack([h.pose.rotation, h.pose.position]).ravel().tolist() for h in hands]
+    rows = _rows([hand.pose for hand in hands])
+    before = sha256(repr(_rows(bodies.poses)).encode()).hexdigest()
     cut = range(0, len(rows), source.together)
     grouped = [rows[i : i + source.together] for i in cut]
-    questions = [msgspec.msgpack.encode(Chunk(poses=group)) for group in grouped]
+    questions = [msgspec.msgpack.encode(Chunk(poses=group, bodies=before)) for group in grouped]
     tables, lost_places = list[ReachTable](), 0
     for group, answer in zip(grouped, _asked("reach", questions, asked, report), strict=True):
         if answer is None:
@@ -265,6 +271,10 @@ def _asked(
         if report is not None:
             report(phase, i + 1, len(questions))
         yield None if answer is None else _read(answer)
+
+
+def _rows(poses: Sequence[Pose]) -> list[list[float]]:
+    return [np.column_stack([each.rotation, each.position]).ravel().tolist() for each in poses]
 
 
 def _given_places(source: WallSource) -> tuple[list[HandOnHold], list[HandParts]]:

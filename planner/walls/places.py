@@ -22,9 +22,9 @@ from hand_models.fixed_wrist import HoldTrial, closed_holds, grid_of_trials, wre
 from hand_models.hand import Grasp, SpinyHand
 from hand_models.rock import Mesh
 from hand_models.tile import Surface
-from planner.programs import WRENCH_UNIT
+from hand_models.wrench_spaces import ends_along
 from planner.question import HandOnHold
-from planner.screening import HandParts, WorldHands
+from planner.screening import HandParts
 from planner.walls.grids import PlaceGrid
 
 __all__ = ["HandPlace", "best_places", "hand_at", "palms_apart", "place_trials"]
@@ -59,8 +59,8 @@ class HandPlace(NamedTuple):
     outer_rotation : float
         Rotation of its outer fingers [rad].
     lift : float
-        Largest force on the robot against gravity that it can make the rock exert, whatever other
-        forces and moments come with it [N].
+        Largest force straight against gravity that the rock exerts on the robot by this hand,
+        whatever moments come with it [N].
     parts : HandParts
     """
 
@@ -104,7 +104,7 @@ def best_places(
     spaces = iter(wrench_spaces([o for o in outcomes if not isinstance(o, InvalidInputError)]))
     found, refused = list[HandPlace](), Counter[str]()
     rest = iter(outcomes)
-    way = np.append(up / np.linalg.norm(up), np.zeros(3))
+    down = -up / np.linalg.norm(up)
     for trials in points:
         here = list[HandPlace]()
         for trial in trials:
@@ -114,7 +114,8 @@ def best_places(
                 refused[reason] += 1
                 continue
             try:
-                parts = HandParts.of(next(spaces))
+                space = next(spaces)
+                parts = HandParts.of(space)
             except EmptySetError:
                 refused["holds_nothing"] += 1
                 continue
@@ -122,8 +123,10 @@ def best_places(
                 refused["unbounded"] += 1
                 continue
             at = outcome.seating.pose
-            hands = WorldHands.of([parts], [at.inverse()], np.zeros(3))
-            lift = float(hands.supports(way)[0, 0]) * WRENCH_UNIT[0]
+            # of the hand on the rock, in H
+            way = at.rotation @ down
+            ends = ends_along(way, space.origin[:3], space.generators[:3], space.A, space.b)
+            lift = 0.0 if ends is None else ends[1]
             if lift > 0.0:
                 here.append(HandPlace(at, trial.outer_rotation, lift, parts))
             else:

@@ -1,7 +1,12 @@
 from .advice_requests import advised as advised, rewritten as rewritten
 from .answers import Planned as Planned
 from .body_space import explore as explore
-from .diagnosis import answer_diagnosis as answer_diagnosis
+from .climbs import (
+    SoughtClimb as SoughtClimb,
+    answer_climb as answer_climb,
+    climb_reply as climb_reply,
+    seek_climb as seek_climb,
+)
 from .dispatch import (
     SERVICES_BY_NAME as SERVICES_BY_NAME,
     answer_plan as answer_plan,
@@ -22,9 +27,12 @@ from .own_models import (
     with_robot as with_robot,
 )
 from .questions import (
+    pose_message as pose_message,
     question as question,
     route_of as route_of,
+    route_request as route_request,
     stage_request as stage_request,
 )
+from .slips import answer_diagnosis as answer_diagnosis
 from .stances import stance as stance
 from .streams import Streams as Streams, opened as opened, set_points_reply as set_points_reply

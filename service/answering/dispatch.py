@@ -18,12 +18,13 @@ from service.answering.body_space import with_com_region
 from service.answering.mesh_files import MeshFiles
 from service.answering.own_models import BUNDLED_ROBOTS, Robots, over_default
 from service.answering.questions import climb, question
-from service.answering.reply_sizes import fitted
+from service.answering.reply_sizes import fitted, fitted_part
+from service.answering.slips import add_survival, answer_diagnosis, check_survival
 from service.answering.streams import LOCAL_STREAMS, Streams
-from service.answering.survival import add_survival, check_survival
-from service.replies import BriefPlanReply, PlanReply, Reply, StreamReply
+from service.replies import BriefPlanReply, PartReply, PlanReply, Reply, StreamReply
 from service.requests import (
     BodySpaceRequest,
+    ClimbRequest,
     DiagnosisRequest,
     PlanRequest,
     Query,
@@ -160,42 +161,55 @@ def answer_with_advice(answer: Planned) -> Planned:
     return Planned(answer.question, found, reply)
 
 
-def _wrench_space(asked: WrenchSpaceRequest, robots: Robots, _: Streams) -> Reply:
+Report = Callable[[PartReply], None]
+
+
+def _wrench_space(asked: WrenchSpaceRequest, robots: Robots, *_: object) -> Reply:
     from service.answering.hand_spaces import answer_wrench_space
 
     return answer_wrench_space(asked, robots)
 
 
-def _body_space(asked: BodySpaceRequest, robots: Robots, _: Streams) -> Reply:
+def _body_space(asked: BodySpaceRequest, robots: Robots, *_: object) -> Reply:
     from service.answering.body_space import explore
 
     return explore(asked, robots).reply
 
 
-def _diagnosis(asked: DiagnosisRequest, robots: Robots, _: Streams) -> Reply:
-    from service.answering.diagnosis import answer_diagnosis
-
+def _diagnosis(asked: DiagnosisRequest, robots: Robots, *_: object) -> Reply:
     return answer_diagnosis(asked, robots)
 
 
+def _climb(asked: ClimbRequest, robots: Robots, _: Streams, report: Report | None = None) -> Reply:
+    from service.answering.climbs import answer_climb
+
+    return answer_climb(asked, robots, report)
+
+
 class _Service(NamedTuple):
-    """Kind of request, and the function of request, robots and streams that answers it."""
+    """Kind of request, and the function that answers it.
+
+    The function takes request, robots, streams, and what sends parts of the answer.
+    """
 
     request: type[Request]
-    answer: Callable[[Any, Robots, Streams], Reply | Planned]
+    answer: Callable[[Any, Robots, Streams, Report | None], Reply | Planned]
 
 
 SERVICES_BY_NAME: Final[dict[str, _Service]] = {
-    ServiceName.PLAN: _Service(PlanRequest, lambda asked, robots, _: planned(asked, robots)),
+    ServiceName.PLAN: _Service(PlanRequest, lambda asked, robots, *_: planned(asked, robots)),
     ServiceName.WRENCH_SPACE: _Service(WrenchSpaceRequest, _wrench_space),
     ServiceName.BODY_SPACE: _Service(BodySpaceRequest, _body_space),
     ServiceName.DIAGNOSIS: _Service(DiagnosisRequest, _diagnosis),
-    ServiceName.ROUTE: _Service(RouteRequest, lambda asked, robots, _: climb(asked, robots)),
+    ServiceName.ROUTE: _Service(
+        RouteRequest, lambda asked, robots, _, report: climb(asked, robots, report)
+    ),
+    ServiceName.CLIMB: _Service(ClimbRequest, _climb),
     ServiceName.STREAM: _Service(
-        StreamRequest, lambda asked, robots, streams: streams.declare(asked, robots)
+        StreamRequest, lambda asked, robots, streams, _: streams.declare(asked, robots)
     ),
     ServiceName.SET_POINTS: _Service(
-        SetPointsRequest, lambda asked, _, streams: streams.set_points(asked)
+        SetPointsRequest, lambda asked, _, streams, __: streams.set_points(asked)
     ),
 }
 """Request type and handler of each service over zenoh, by the last part of the service's key."""
@@ -212,6 +226,7 @@ def handle(
     streams: Streams = LOCAL_STREAMS,
     files: MeshFiles | None = None,
     revised: Callable[[Any], Any] | None = None,
+    send: Callable[[Answer], None] | None = None,
 ) -> Answer:
     """Answer one query: decode the request, dispatch it to its handler, and encode the reply.
 
@@ -240,6 +255,9 @@ def handle(
         Reader of the mesh files that a plan request may name. By default such a request is refused.
     revised : callable, optional
         Maps the decoded request to the request that is answered in its place.
+    send : callable, optional
+        Takes parts of the answer, each an encoded reply that is not the last. By default the answer
+        is whole, also where the request asks for parts.
 
     Returns
     -------
@@ -257,6 +275,11 @@ def handle(
         name, most = identifier(payload, form, kind), most_error_bytes(payload, form, kind)
         return encode_error(error, form, name, named, most)
 
+    def report(part: PartReply) -> None:
+        assert send is not None
+        for payload in fitted_part(request, part, form):
+            send(Answer(payload, form.label(part), last=False))
+
     try:
         form = Format.named(encoding)
         name = key.rpartition("/")[2]
@@ -272,7 +295,7 @@ def handle(
         within = request.deadline if isinstance(request, Query) else None
         with deadline.within(within, started=started):
             deadline.check("the answer was started")
-            found = service.answer(request, robots, streams)
+            found = service.answer(request, robots, streams, None if send is None else report)
         try:
             reply, data = fitted(request, found, form)
         except LimitError:

@@ -23,10 +23,12 @@ from hand_models.parameters import ParameterTable, load_own_hand, own_draw, own_
 from planner import Robot, RobotFile, robosimian, robot_of
 from service.requests import (
     BodySpaceRequest,
+    ClimbRequest,
     DiagnosisRequest,
     Draw,
     PlanRequest,
     RouteRequest,
+    Stance,
     StreamRequest,
     WrenchSpaceRequest,
 )
@@ -53,7 +55,8 @@ RequestT = TypeVar(
     | BodySpaceRequest
     | StreamRequest
     | DiagnosisRequest
-    | RouteRequest,
+    | RouteRequest
+    | ClimbRequest,
 )
 
 Builder = Callable[[ParameterTable | None], Robot]
@@ -141,7 +144,7 @@ def with_hand(request: RequestT, own: ParameterTable | None) -> RequestT:
     """
     if own is None:
         return request
-    return _asking_for(request, request.stance.hand or {}, _entries(own))
+    return _asking_for(request, _robot_part(request).hand or {}, _entries(own))
 
 
 def over_default(request: RequestT, default: ParameterTable | None) -> RequestT:
@@ -157,7 +160,7 @@ def over_default(request: RequestT, default: ParameterTable | None) -> RequestT:
     """
     if default is None:
         return request
-    return _asking_for(request, _entries(default), request.stance.hand or {})
+    return _asking_for(request, _entries(default), _robot_part(request).hand or {})
 
 
 def _entries(own: ParameterTable) -> dict[str, dict[str, Any]]:
@@ -173,7 +176,19 @@ def _asking_for(request: RequestT, low: Mapping[str, Any], high: Mapping[str, An
         # an entry that is no section is refused later
         if isinstance(high[section], Mapping) and isinstance(low[section], Mapping):
             hand[section] = {**low[section], **high[section]}
-    stance = msgspec.structs.replace(request.stance, hand=hand)
+    return _replaced(request, hand=hand)
+
+
+def _robot_part(request: RequestT) -> Stance | ClimbRequest:
+    """Return the part of a request that names robot and hand: its stance, or all of a climb's."""
+    return request if isinstance(request, ClimbRequest) else request.stance
+
+
+def _replaced(request: RequestT, **fields: Any) -> RequestT:
+    """Return a request with other fields in the part that names robot and hand."""
+    if isinstance(request, ClimbRequest):
+        return msgspec.structs.replace(request, **fields)
+    stance = msgspec.structs.replace(request.stance, **fields)
     return msgspec.structs.replace(request, stance=stance)
 
 
@@ -256,12 +271,11 @@ def with_robot(request: RequestT, file: RobotFile | None) -> RequestT:
     """
     if file is None:
         return request
-    named = request.stance.robot
+    named = _robot_part(request).robot
     if named not in (None, file.name):
         raise InvalidInputError(
             f"the stance is for {named!r}, the file {file.origin} describes {file.name!r}; name "
             f"{file.name!r} in the stance, or none",
-            field="stance.robot",
+            field="robot" if isinstance(request, ClimbRequest) else "stance.robot",
         )
-    stance = msgspec.structs.replace(request.stance, robot=file.name)
-    return msgspec.structs.replace(request, stance=stance)
+    return _replaced(request, robot=file.name)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from msgspec import UNSET, structs
 
-from hand_models.base import Array, InvalidInputError, errors_under
+from hand_models.base import Array, InvalidInputError, Pose, errors_under
 from hand_models.parameters import ParameterSample, own_draw
-from planner import Load, Question
+from planner import HandOnHold, Load, Question
 from service import requests
 from service.answering.own_models import BUNDLED_ROBOTS, Robots
 from service.answering.stances import (
@@ -21,12 +21,27 @@ from service.answering.stances import (
     stance,
     with_rocks,
 )
-from service.replies import ClimbFailureReply, KnotReply, RouteReply, RouteStageReply
+from service.replies import (
+    ClimbFailureReply,
+    KnotReply,
+    PartReply,
+    RouteReply,
+    RouteStageReply,
+)
 
 if TYPE_CHECKING:
-    from planner import Route, RouteStage
+    from planner import Knot, Route, RouteResult, RouteStage
 
-__all__ = ["climb", "question", "route_of", "stage_request"]
+__all__ = [
+    "KnotParts",
+    "climb",
+    "pose_message",
+    "question",
+    "route_of",
+    "route_request",
+    "stage_replies",
+    "stage_request",
+]
 
 
 def question(request: requests.PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Question:
@@ -102,11 +117,13 @@ def route_of(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) ->
     hands = hands_on_rocks(request.moves, start.robot.hand, rocks, "moves")
     places = [f"moves[{i}].body" for i in range(len(request.moves))]
     bodies = poses_of({at: each.body for at, each in zip(places, request.moves, strict=True)})
+    end = poses_of({"end": request.end}).get("end")
     angles = [joints_of(move.joints) or "solve" for move in request.moves]
     return Route(
         name=request.name,
         start=start,
         moves=tuple(map(Move, hands, map(bodies.get, places), angles)),
+        end=end,
         load=request.load or Load(),
         limits=request.limits,
         objective=request.objective,
@@ -114,6 +131,68 @@ def route_of(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) ->
         want=frozenset(want for want in request.want if want != "trajectory"),
         draws=_draws(request.draws),
     )
+
+
+def route_request(asked: requests.ClimbRequest, route: Route) -> requests.RouteRequest:
+    """Return the route that was found for a climb as a request, without the climb's rock.
+
+    Parameters
+    ----------
+    asked : ClimbRequest
+    route : Route
+        All its hands are on that request's rock, with the pose of the rock in H.
+
+    Returns
+    -------
+    RouteRequest
+        Its hands name the rock ``rock``, which has to be put into ``stance.rocks``.
+    """
+    start, joints = route.start, route.start.joints
+    stance = requests.Stance(
+        robot=asked.robot,
+        hand=asked.hand,
+        gravity=_vector(start.gravity),
+        body=pose_message(start.body),
+        joints=joints if joints is None or isinstance(joints, str) else _lists(joints),
+        hands=[requests.Hand(**_hand_fields(asked, hand)) for hand in start.hands],
+    )
+    return requests.RouteRequest(
+        v=1,
+        name=route.name,
+        stance=stance,
+        objective=route.objective,
+        limits=route.limits,
+        moves=[
+            requests.Move(
+                **_hand_fields(asked, move.hand),
+                body=None if move.body is None else pose_message(move.body),
+                joints="solve" if isinstance(move.joints, str) else _lists(move.joints),
+            )
+            for move in route.moves
+        ],
+        end=None if route.end is None else pose_message(route.end),
+        explain=route.explain,
+    )
+
+
+def _hand_fields(asked: requests.ClimbRequest, hand: HandOnHold) -> dict[str, Any]:
+    """Return the fields of a hand of a request that is on the climb's rock."""
+    assert hand.hold_in_hand is not None
+    hold = requests.RockReference(rock="rock", pose_in_hand=pose_message(hand.hold_in_hand))
+    surface, grasp = asked.surface, hand.grasp
+    own = {"limb": hand.limb, "pose": pose_message(hand.pose), "hold": hold}
+    return own | {"surface": surface, "grasp": grasp}
+
+
+def pose_message(pose: Pose) -> requests.Pose:
+    """Return a pose as a message."""
+    x, y, z, w = pose.quaternion().tolist()
+    return requests.Pose(position=_vector(pose.position), orientation=(x, y, z, w))
+
+
+def _vector(values: Array) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
 
 
 def stage_request(
@@ -142,6 +221,8 @@ def stage_request(
         if number < stage.move or stage.phase == "place":
             fields = {name: getattr(move, name) for name in requests.Hand.__struct_fields__}
             hands[move.limb] = requests.Hand(**fields)
+    if stage.move > len(request.moves):
+        body = request.end or body
     asked = stage.question
     angles = asked.stance.joints if joints is None else joints
     stance = structs.replace(
@@ -177,7 +258,53 @@ def _draws(messages: Sequence[requests.Draw]) -> tuple[ParameterSample, ...] | N
     return tuple(found) or None
 
 
-def climb(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> RouteReply:
+def stage_replies(result: RouteResult) -> list[RouteStageReply]:
+    """Convert the plans of a route's stages into replies."""
+    return [
+        RouteStageReply(
+            move=stage.move,
+            phase=stage.phase,
+            limb=stage.limb,
+            status=plan.status,
+            utilisation=plan.utilisation,
+            load_factor=plan.load_factor,
+            load_factor_unbounded=plan.load_factor_unbounded,
+            load_factor_status=plan.load_factor_status,
+            joint_utilisation=plan.joint_utilisation,
+            limiting=plan.limiting,
+            reason=plan.reason,
+        )
+        for stage, plan in zip(result.stages, result.plans, strict=True)
+    ]
+
+
+class KnotParts:
+    """Parts of an answer with the knots of a climb: at each call those that are new.
+
+    Parameters
+    ----------
+    identifier : str or None
+        ``id`` of the request.
+    report : callable
+        Takes each part.
+    """
+
+    def __init__(self, identifier: str | None, report: Callable[[PartReply], None]) -> None:
+        self._identifier, self._report = identifier, report
+        self._told = 0
+
+    def __call__(self, knots: Sequence[Knot]) -> None:
+        """Report the knots that were not there at the last call, if any."""
+        new, self._told = knots[self._told :], len(knots)
+        if new:
+            self._report(PartReply(id=self._identifier, knots=[KnotReply.of(each) for each in new]))
+
+
+def climb(
+    request: requests.RouteRequest,
+    robots: Robots = BUNDLED_ROBOTS,
+    report: Callable[[PartReply], None] | None = None,
+) -> RouteReply:
     """Plan all stages of a route in this process, and return the reply with its hardest stage.
 
     Parameters
@@ -187,6 +314,8 @@ def climb(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> Ro
     robots : Robots, optional
         Robots that a request may name, with the functions that build them; bundled robots by
         default.
+    report : callable, optional
+        Takes the parts of the answer that come before the reply, if the request asks for parts.
 
     Returns
     -------
@@ -201,8 +330,12 @@ def climb(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> Ro
     """
     from planner import evaluate, plan_climb
 
-    route = route_of(request, robots)
-    found = plan_climb(route) if "trajectory" in request.want else None
+    route, found = route_of(request, robots), None
+    told = None if report is None or not request.parts else KnotParts(request.id, report)
+    if "trajectory" in request.want:
+        found = plan_climb(route, knots=told)
+        if told is not None:
+            told(found.knots)
     result = evaluate(route, workers=1, climb=found)
     crux = result.plans[result.crux]
     return RouteReply(
@@ -215,23 +348,10 @@ def climb(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> Ro
         load_factor_unbounded=result.load_factor_unbounded,
         load_factor_status=result.load_factor_status,
         limiting=crux.limiting,
-        stages=[
-            RouteStageReply(
-                move=stage.move,
-                phase=stage.phase,
-                limb=stage.limb,
-                status=plan.status,
-                utilisation=plan.utilisation,
-                load_factor=plan.load_factor,
-                load_factor_unbounded=plan.load_factor_unbounded,
-                load_factor_status=plan.load_factor_status,
-                joint_utilisation=plan.joint_utilisation,
-                limiting=plan.limiting,
-                reason=plan.reason,
-            )
-            for stage, plan in zip(result.stages, result.plans, strict=True)
-        ],
+        stages=stage_replies(result),
         warnings=list(dict.fromkeys(text for p in result.plans for text in p.warnings)),
-        trajectory=UNSET if found is None else [KnotReply.of(knot) for knot in found.knots],
+        trajectory=UNSET
+        if found is None or told is not None
+        else [KnotReply.of(knot) for knot in found.knots],
         failure=UNSET if found is None else ClimbFailureReply.of(found.failure),
     )

@@ -11,11 +11,11 @@ from msgspec.structs import fields, replace
 from hand_models.base import LimitError
 from service.answering.answers import Planned
 from service.answering.streams import brief_set_points
-from service.replies import PlanReply, Reply, SetPointsReply
+from service.replies import PartReply, PlanReply, Reply, SetPointsReply
 from service.requests import Detail, PlanRequest, Query, Request, SetPointsRequest
 from service.wire import Format
 
-__all__ = ["fitted"]
+__all__ = ["fitted", "fitted_part"]
 
 
 def fitted(request: Request, found: Reply | Planned, form: Format) -> tuple[Reply, bytes]:
@@ -65,6 +65,27 @@ def fitted(request: Request, found: Reply | Planned, form: Format) -> tuple[Repl
     without = {words: len(form.encode(less)) for words, less in _with_less_in_it(reply, bare)}
     sizes |= {words: size for words, size in without.items() if size < len(payload)}
     raise _too_large(len(payload), most, sizes)
+
+
+def fitted_part(request: Request, part: PartReply, form: Format) -> Iterator[bytes]:
+    """Yield a part of an answer, encoded, in so many replies that each has the bytes it may have.
+
+    Raises
+    ------
+    LimitError
+        If a single knot has more bytes than the request's ``max_reply_bytes``.
+    """
+    payload = form.encode(part)
+    most = request.max_reply_bytes if isinstance(request, Query) else None
+    if most is None or len(payload) <= most:
+        yield payload
+        return
+    knots = part.knots or []
+    if len(knots) < 2:
+        raise _too_large(len(payload), most, {})
+    half = len(knots) // 2
+    for some in (knots[:half], knots[half:]):
+        yield from fitted_part(request, replace(part, knots=some), form)
 
 
 def _with_less_detail(found: Reply | Planned, given: Detail) -> Iterator[tuple[Detail, Reply]]:

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from hashlib import blake2b
-from typing import Final, Literal
+from typing import Literal
 
-import msgspec
 import numpy as np
 
 from hand_models import rock
 from hand_models.base import (
     Array,
-    BoundedStore,
     InvalidInputError,
     Pose,
     errors_under,
@@ -24,17 +21,12 @@ from hand_models.base import (
 from hand_models.fixed_wrist import ALONG_FINGERS, approach_frame
 from hand_models.hand import SpinyHand
 from hand_models.parameters import ParameterTable, own_hand
-from hand_models.rock import Mesh, Profile
-from hand_models.tile import Surface
 from planner import EARTH_GRAVITY, HandOnHold, Stance, come_to_rest, settle_each
 from service import requests
+from service.answering.holds import check_costs, hold_of, surface_of
 from service.answering.own_models import BUNDLED_ROBOTS, Robots, builder_of
-from service.answering.stance_costs import check_costs
 
 __all__ = ["Rocks", "array_of", "hands_on_rocks", "joints_of", "poses_of", "stance", "with_rocks"]
-
-MESHES_OF_REQUESTS: Final[BoundedStore[Hashable, Mesh]] = BoundedStore("meshes of requests", 8)
-"""LRU cache of eight meshes by vertices, faces and parameters, with the hands settled on each."""
 
 Rocks = Mapping[str, tuple[rock.Hold, Pose | None]]
 """Rocks of a stance by name: each rock's shape, and its pose in W, or None where none is given."""
@@ -168,7 +160,7 @@ def _hand(
     ``at``: path of the hand in the request; ``poses``: given poses by path; ``numbers``:
     parameters of the robot's hands.
     """
-    surface = _surface(message.surface)
+    surface = surface_of(message.surface)
     pose, in_hand = poses.get(f"{at}.pose"), poses.get(f"{at}.hold.pose_in_hand")
     try:
         hold, hold_pose = _placed_hold(message, poses.get(f"{at}.hold.pose"), numbers, rocks)
@@ -217,7 +209,7 @@ def _placed_hold(
     """Return the hold of a hand, and its frame in W: the given pose, or that of its rock."""
     hold, anywhere = message.hold, message.place is not None
     if not isinstance(hold, requests.RockReference):
-        return _hold(hold, numbers, anywhere), pose
+        return hold_of(hold, numbers, anywhere), pose
     if hold.rock not in rocks:
         known = f"known are {', '.join(rocks)}" if rocks else "stance.rocks names none"
         raise InvalidInputError(f"unknown rock {hold.rock!r}; {known}", field="rock")
@@ -298,28 +290,6 @@ def _frame(place: requests.Place, rock_pose: Pose) -> Pose:
         return approach_frame(point, axes @ place.approach, place.wrist_angle, axes @ up)
 
 
-def _surface(message: str | requests.Surface) -> Surface:
-    """Return the surface of a preset's name or of a caller's own numbers."""
-    try:
-        if isinstance(message, str):
-            return Surface.named(message)
-        given = {
-            "shear_limit": message.shear_limit,
-            "pull_off_limit": message.pull_off_limit,
-            "pull_off_angle": message.pull_off_angle,
-            "lateral_limit": message.lateral_limit,
-            "compression_gain": message.compression_gain,
-            "half_planes": message.half_planes,
-            "lateral_pull_off_ratio": message.lateral_pull_off_ratio,
-            "shear_scatter": message.shear_scatter,
-            "friction": message.friction,
-            "pull_off_exponent": message.pull_off_exponent,
-        }
-        return Surface.from_values({name: v for name, v in given.items() if v is not None})
-    except InvalidInputError as error:
-        raise error.within("surface") from None
-
-
 # Holds --------------------------------------------------------------------------------------------
 
 
@@ -336,54 +306,6 @@ def _rocks(message: requests.Stance, numbers: ParameterTable) -> Rocks:
                     "it",
                     field="pose_in_hand",
                 )
-            hold = _hold(each, numbers, anywhere=True)
+            hold = hold_of(each, numbers, anywhere=True)
             found[name] = hold, poses_of({"pose": each.pose}).get("pose")
     return found
-
-
-def _hold(message: requests.Rock, numbers: ParameterTable, anywhere: bool) -> rock.Hold:
-    """Return the hold of a message; ``anywhere``: true if its frame may begin off the rock."""
-    match message:
-        case requests.Plane():
-            return rock.Plane()
-        case requests.Cylinder():
-            return rock.Cylinder(message.diameter)
-        case requests.Sphere():
-            return rock.Sphere(message.diameter)
-        case requests.Ellipsoid():
-            return rock.Ellipsoid(message.semi_axes)
-        case requests.Edge():
-            return rock.Edge(message.fillet_radius, message.angle)
-        case requests.Profile():
-            return _profile(message, numbers)
-        case requests.Mesh():
-            return _mesh(message, numbers, anywhere)
-
-
-def _profile(message: requests.Profile, numbers: ParameterTable) -> Profile:
-    if message.points is not None and message.profiles is None:
-        return Profile(message.points, numbers)
-    if message.profiles is not None and message.points is None:
-        strips = message.profiles
-        outlines = {
-            "outer_left": strips.outer_left,
-            "inner_left": strips.inner_left,
-            "inner_right": strips.inner_right,
-            "outer_right": strips.outer_right,
-        }
-        return Profile(outlines, numbers)
-    got = "neither" if message.points is None else "both"
-    raise InvalidInputError(f"give points or profiles, got {got}", field="points")
-
-
-def _mesh(message: requests.Mesh, numbers: ParameterTable, anywhere: bool) -> Mesh:
-    if message.file is not None:
-        raise InvalidInputError(
-            "only the command line reads files; send vertices and faces", field="file"
-        )
-    if message.vertices is None or message.faces is None:
-        missing = "vertices" if message.vertices is None else "faces"
-        raise InvalidInputError("missing; give vertices and faces", field=missing)
-    vertices, faces = message.vertices, message.faces
-    key = blake2b(msgspec.msgpack.encode((vertices, faces))).digest(), numbers, anywhere
-    return MESHES_OF_REQUESTS.get(key, lambda: Mesh(vertices, faces, numbers, anywhere=anywhere))

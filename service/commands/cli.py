@@ -49,8 +49,12 @@ COMMANDS_BY_NAME: Final = {
         "Show what the body can bear: which wrenches, and which accelerations.",
     ),
     "check": Entry(
-        "check",
+        "studies",
         "Recompute what the certificate of a climb claims, without the search.",
+    ),
+    "climb": Entry(
+        "routes",
+        "Search for the best climb on ROCK, with proof how much better any other can be.",
     ),
     "demo": Entry(
         "network",

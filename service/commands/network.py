@@ -116,12 +116,13 @@ def serve_command(
                 f"another service already answers {wire.service_key(service.robot, '…')}: queries "
                 "may reach either; --no-multicast-scouting keeps services apart"
             )
+        where = ", ".join(endpoints) or "no address"
+        tables.remark(f"listening on {where}; the workers start, which takes some seconds")
         with service:
             stop.waits_for()
             if as_json:
                 tables.say({"v": 1, "keys": service.keys, "listen": endpoints})
-            where = ", ".join(endpoints) or "no address"
-            tables.remark(f"serving {', '.join(service.keys)}; listening on {where}")
+            tables.remark(f"ready; serving {', '.join(service.keys)}")
             if open_to := serving.exposed(config):
                 tables.note(
                     f"{', '.join(open_to)}: whoever reaches it can ask, and read what zenoh "
@@ -279,13 +280,28 @@ def play_command(
     metavar="FILE",
     help="Where the picture goes.",
 )
+@click.option(
+    "--climb",
+    "folder",
+    is_flag=False,
+    flag_value="crux-climb",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="[DIR]",
+    help="Search for a climb on the bundled small wall instead; where its files go.",
+)
 @options.own_options
 @options.json_option
-def demo_command(picture: Path, own: options.Own, as_json: bool) -> int:
+def demo_command(picture: Path, folder: Path | None, own: options.Own, as_json: bool) -> int:
     """Start the service, ask it for a plan of a real stance, and draw the answer.
 
     A robot of --robot whose limbs do not reach that stance's holds is planned for without joints.
     """
+    if folder is not None:
+        from service import climbs
+        from service.commands.routes import find_climb
+
+        asked = own.asked(climbs.demo_request())
+        return find_climb(asked, folder, options.WorkersOption(None, None), own, as_json)
     request = options.with_extras(own.asked(stances.read_request("wall-300-joints")))
     serving.start_zenoh_log()
     config = serving.zenoh_config(settings=["listen/endpoints:[]"], multicast=False)

@@ -46,7 +46,7 @@ __all__ = [
     "workers_options",
 ]
 
-RequestT = TypeVar("RequestT", requests.PlanRequest, requests.RouteRequest)
+RequestT = TypeVar("RequestT", requests.PlanRequest, requests.RouteRequest, requests.ClimbRequest)
 Command = Callable[..., Any]
 
 PICTURE_ENDINGS: Final = (".png", ".pdf", ".svg")

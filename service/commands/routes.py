@@ -1,12 +1,10 @@
-"""Define ``crux route``: plan one climb with a report, or many as table rows or replies."""
+"""Define ``crux route`` and ``crux climb``: plan climbs that are given, or search for one."""
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from itertools import islice
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -20,16 +18,15 @@ from hand_models.base import (
     InvalidInputError,
     UnsupportedError,
     to_install,
-    whole_file,
 )
-from service import answering, bulk, replies, requests, tables, wire
+from service import answering, bulk, climbs, requests, tables, wire
 from service.commands import options, stances
 from service.commands.batch import answer_rest, complain, exit_status, new_run
 
 if TYPE_CHECKING:
     from hand_models.base import Array
 
-__all__ = ["route_command"]
+__all__ = ["climb_command", "find_climb", "route_command"]
 
 LISTED_ENDINGS: Final = ".jsonl or .csv or .parquet"
 
@@ -105,6 +102,97 @@ def route_command(
     return _one(_Asked.of(routes, wanted, own), output, parallel.workers, own, as_json)
 
 
+def _above(name: str, text: str, most: float = 1e3, **more: Any) -> Any:
+    """Return an option whose value is a number above zero."""
+    return click.option(name, type=options.FiniteRange(0.0, most, min_open=True), help=text, **more)
+
+
+END_FORMS: Final = "x,y,z in W, height:Z, or a stance"
+
+sought_options = options.asked_for(
+    climbs.Sought,
+    "sought",
+    click.option("--from", "start", required=True, metavar="END", help=f"Start: {END_FORMS}."),
+    click.option("--to", "goal", required=True, metavar="END", help=f"Goal: {END_FORMS}."),
+    _above("--radius", "Of the body's origin about x,y,z [m].", default=0.3, show_default=True),
+    click.option(
+        "--best-within",
+        default="5%",
+        show_default=True,
+        metavar="PART",
+        help="By which another climb may be better.",
+    ),
+    _above("--at-least", "Load factor that is enough in all stages."),
+    _above("--time", "After which the best climb so far is taken [s].", most=1e6),
+    click.option("--surface", default="rock", show_default=True, help="A preset's name."),
+    _above("--spacing", "Of the points at which hands are tried [m].", most=10.0),
+    _above("--body-spacing", "Of the places of the body [m].", most=10.0),
+    click.option(
+        "--lean",
+        type=options.FiniteRange(-1.57, 1.57),
+        default=0.0,
+        show_default=True,
+        help="Of a mesh's x from the vertical, away from the climber [rad].",
+    ),
+)
+
+
+@click.command("climb")
+@click.argument("rock", type=click.Path(path_type=Path))
+@sought_options
+@options.folder_option("Where route, trajectory, stances, pictures, tables and the proof go.")
+@options.workers_options
+@options.own_options
+@options.json_option
+def climb_command(
+    rock: Path,
+    sought: climbs.Sought,
+    folder: Path,
+    parallel: options.WorkersOption,
+    own: options.Own,
+    as_json: bool,
+) -> int:
+    """Search for the best climb on ROCK, with proof how much better any other can be.
+
+    ROCK is a mesh in metres with x up the rock and z into it, or a generated wall. height:Z is the
+    height of the body's origin in W: at most Z at the start, at least Z at the goal.
+
+    Exit status: 0 with a climb, 3 if it is proven that there is none or no moves have a plan, 1 if
+    none was found in time.
+    """
+    return find_climb(
+        own.asked(sought.request(rock, stances.read_request)), folder, parallel, own, as_json
+    )
+
+
+def find_climb(
+    request: requests.ClimbRequest,
+    folder: Path,
+    parallel: options.WorkersOption,
+    own: options.Own,
+    as_json: bool,
+) -> int:
+    """Search for a climb, write its files, and print the verdict; return the exit status."""
+    with tables.filling_folder():
+        folder.mkdir(parents=True, exist_ok=True)
+    tables.write_alone(folder / "climb", folder)
+    # a wall takes as long as some thousand plans
+    on, workers = parallel.place(1000)
+    found = climbs.seek(request, own.robots, on, workers)
+    with tables.filling_folder():
+        files = climbs.write_search(request, found, folder)
+        if found.found.result is not None:
+            asked = _Asked.of([str(files["route"])], options.Wanted(False, None, True), own)
+            climb = found.found.climb
+            files |= climbs.write_route(found.found.result, climb, folder, asked.stage)[0]
+    if as_json:
+        reply = msgspec.to_builtins(answering.climb_reply(request, found))
+        tables.say(reply | {"files": {name: str(path) for name, path in files.items()}})
+    else:
+        climbs.print_verdict(found.found, request.at_least, files, tables.console())
+    return climbs.exit_status(found.found)
+
+
 class _Asked(NamedTuple):
     """A route request with its meshes, and as its file has it, which names mesh files."""
 
@@ -151,13 +239,7 @@ def _one(
         result = planner.evaluate(route, workers, report, climb)
     _say_lacking(lacks)
     with tables.filling_folder():
-        knots = [] if climb is None else [replies.KnotReply.of(knot) for knot in climb.knots]
-        trajectory = bulk.write_trajectory(knots, folder)
-        digest = None
-        if climb is not None and knots:
-            digest = bulk.trajectory_digest(folder, climb.rates)
-        files = planner.write_report(result, folder, climb, digest) | trajectory
-        files["stances"] = _write_stages(asked, result, folder / "stages")
+        files, digest = climbs.write_route(result, climb, folder, asked.stage)
     if as_json:
         tables.say(
             planner.summary(result, climb, digest)
@@ -165,7 +247,7 @@ def _one(
         )
     else:
         tables.print_route(result, files, tables.console(), climb)
-        if knots and "trajectory table" not in files:
+        if "trajectory" in files and "trajectory table" not in files:
             tables.remark(f"for the trajectory as a table: {to_install('parquet')}")
     status = tables.ExitStatus.of(result.status)
     fails = climb is not None and climb.fails
@@ -188,24 +270,6 @@ def _say_lacking(error: UnsupportedError | None) -> None:
         tables.remark(f"no trajectory: {error}")
 
 
-def _write_stages(asked: _Asked, result: planner.RouteResult, folder: Path) -> Path:
-    """Write each stage as a stance of its own; return the folder."""
-    folder.mkdir(exist_ok=True)
-    for old in folder.glob("*.json"):
-        if old.name.partition("-")[0].isdecimal():
-            old.unlink()
-    for stage, answer in zip(result.stages, result.plans, strict=True):
-        name = "-".join(filter(None, (f"{stage.index:02d}", stage.phase, stage.limb)))
-        request = asked.stage(stage, answer.joints, folder)
-        _write_stance(request, folder / f"{name}.json")
-    return folder
-
-
-def _write_stance(request: requests.PlanRequest, file: Path) -> None:
-    with whole_file(file) as part:
-        part.write_bytes(msgspec.json.format(msgspec.json.encode(request)))
-
-
 def _stage(asked: _Asked, index: int, file: Path | None, own: options.Own, as_json: bool) -> int:
     """Print the plan of one stage, and write its stance."""
     if file is not None and file.suffix.lower() != ".json":
@@ -226,7 +290,7 @@ def _stage(asked: _Asked, index: int, file: Path | None, own: options.Own, as_js
     _say_lacking(lacks)
     if file is not None:
         with tables.writing(file):
-            _write_stance(asked.stage(stage, joints or answer.plan.joints, file.parent), file)
+            climbs.write_stance(asked.stage(stage, joints or answer.plan.joints, file.parent), file)
     return tables.show(answer.reply, as_json)
 
 
@@ -334,48 +398,5 @@ def _many(
         counts = {"statuses": dict(sink.tally.statuses), "errors": dict(sink.tally.kinds)}
         tables.say({"v": 1, "routes": routes.count, **counts, "file": str(file)})
     else:
-        _print(file, routes, before, elapsed)
+        climbs.print_routes(file, routes.names, before, elapsed)
     return exit_status(sink.tally)
-
-
-def _print(file: Path, routes: _Routes, before: int, elapsed: float) -> None:
-    """Print the result of each route, and the file of the results."""
-    from service.tables import name
-
-    out = tables.console()
-    crux = ("crux_phase", "crux_limb")
-    columns = (
-        name("status", lambda row: row["status"] or f"error: {row['error_kind']}"),
-        name("crux", lambda row: " ".join(filter(None, map(row.get, crux))) or None),
-        tables.number("move", "crux_move"),
-        tables.number("util", "utilisation", lambda value: f"{float(value):.2f}"),
-        tables.number("load factor", "load_factor", lambda value: f"{float(value):.2f}"),
-        tables.text("route"),
-    )
-    if tables.verbosity() >= 0:
-        most = 100
-        named = zip(routes.names, islice(_rows(file), most), strict=False)
-        tables.print_rows([row | {"route": route} for route, row in named], columns, out)
-        if routes.count > most:
-            out.print(f"and {routes.count - most} more", markup=False)
-    known = f", {before} were answered before" if before else ""
-    out.print(f"{routes.count - before} routes in {elapsed:.1f} s{known}", markup=False)
-    out.print(f"written: {file}", markup=False, soft_wrap=True)
-
-
-def _rows(file: Path) -> Iterator[dict[str, Any]]:
-    """Yield each route's row of a file of any form."""
-    if file.suffix.lower() == ".parquet":
-        from pyarrow import parquet
-
-        yield from parquet.read_table(file).to_pylist()
-    elif file.suffix.lower() == ".csv":
-        with file.open(newline="", encoding="utf-8") as stream:
-            for row in csv.DictReader(stream):
-                yield {name: value or None for name, value in row.items()}
-    else:
-        columns = bulk.route_columns()
-        names = [column.name for column in columns if not column.is_index]
-        with file.open("rb") as lines:
-            for line in lines:
-                yield dict(zip(names, bulk.row_of(line, columns).values, strict=True))

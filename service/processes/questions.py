@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from contextlib import closing, nullcontext
@@ -9,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple
 
 from hand_models.parameters import ParameterTable
-from service.wire import Answer
+from service.wire import Answer, ServiceName
 
 if TYPE_CHECKING:
     from planner import RobotFile
@@ -65,7 +66,7 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
         Takes a `Job` and returns its `Answer`; keeps declared streams from call to call.
     """
     from hand_models.hand import load_closing
-    from planner import deadline
+    from planner import deadline, send_part
     from service.answering import Streams, handle, robots_of
 
     # a single plan loads these only when it needs them
@@ -77,6 +78,9 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
     streams = Streams()
 
     def answer(job: Job) -> Answer:
+        if job.name == ServiceName.CLIMB and hasattr(os, "nice"):
+            # a process that searches for climbs does nothing else: what others need comes first
+            os.nice(max(0, 10 - os.nice(0)))
         start, begun = time.perf_counter(), time.thread_time()
         arrived = start - job.waited
         own = closing(Streams()) if job.rehearsal else nullcontext(streams.of(job.client))
@@ -89,6 +93,7 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
                 robots,
                 started=arrived,
                 streams=asked,
+                send=send_part,
             )
         cost = time.thread_time() - begun
         return found._replace(seconds=time.perf_counter() - start, cost=cost)

@@ -1,10 +1,14 @@
 from .climb import (
+    CancelReply as CancelReply,
     ClimbFailureReply as ClimbFailureReply,
     ClimbSetPoints as ClimbSetPoints,
     HandKnotReply as HandKnotReply,
     KnotReply as KnotReply,
+    PartReply as PartReply,
+    SearchProgress as SearchProgress,
 )
 from .diagnosis import DiagnosisReply as DiagnosisReply, SuspectReply as SuspectReply
+from .found_climb import ClimbReply as ClimbReply
 from .opening import (
     JamReply as JamReply,
     OpeningKnot as OpeningKnot,

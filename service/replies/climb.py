@@ -8,16 +8,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal, Self
 
-from msgspec import Struct
+from msgspec import UNSET, Struct, UnsetType
 
 from planner import LimitName
-from service.replies.reply import PlacedFrame, Vector
+from service.replies.reply import PlacedFrame, Reply, Vector
 
 if TYPE_CHECKING:
     from hand_models.base import Array
     from planner import Failure, HandKnot, Knot
 
-__all__ = ["ClimbFailureReply", "ClimbSetPoints", "HandKnotReply", "KnotReply"]
+__all__ = [
+    "CancelReply",
+    "ClimbFailureReply",
+    "ClimbSetPoints",
+    "HandKnotReply",
+    "KnotReply",
+    "PartReply",
+    "SearchProgress",
+]
 
 
 class HandKnotReply(Struct, kw_only=True):
@@ -134,6 +142,51 @@ class ClimbFailureReply(Struct, kw_only=True):
         if failure is None:
             return None
         return cls(move=failure.move, phase=failure.phase, limb=failure.limb, reason=failure.reason)
+
+
+class SearchProgress(Struct, kw_only=True):
+    """How far the search for a climb is.
+
+    - ``phase``: what is being done: ``placements``, ``reach``, ``sets``, ``search``, ``moves`` or
+      ``stages``.
+    - ``best``: least load factor of the best route so far; null before there is one.
+    - ``bound``: no route has a larger least load factor; null before there is a bound.
+    - ``gap``: how much larger than ``best`` the bound is, as a part of ``best``; null without one
+      of the two.
+    - ``done``, ``total``: steps of this phase that are done, and all of them; zero where they are
+      not known.
+    - ``seconds``: time since the search began [s].
+    """
+
+    phase: str
+    best: float | None
+    bound: float | None
+    gap: float | None
+    done: int
+    total: int
+    seconds: float
+
+
+class CancelReply(Reply, kw_only=True):
+    """Reply to a client that cancels questions.
+
+    - ``cancelled``: number of its questions that have ended by this; they get an error of kind
+      ``cancelled``.
+    """
+
+    cancelled: int
+
+
+class PartReply(Reply, kw_only=True):
+    """Part of an answer, before the last reply to the same query: one of the two is there.
+
+    - ``progress``: how far a search is.
+    - ``knots``: further knots of a climb, in order; those of one move come together, or as many as
+      fit into ``max_reply_bytes``.
+    """
+
+    progress: SearchProgress | UnsetType = UNSET
+    knots: list[KnotReply] | UnsetType = UNSET
 
 
 class ClimbSetPoints(Struct, kw_only=True):

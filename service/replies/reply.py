@@ -210,14 +210,14 @@ class ProcessHealth(Struct, kw_only=True):
     """State of one worker process of a service.
 
     - ``pid``: process identifier; null where the process has none.
-    - ``purpose``: ``questions``; ``streams`` for the process that keeps all streams; ``spare`` for
-      a process that is ready to replace one that ends.
+    - ``purpose``: ``questions``; ``streams`` for the process that keeps all streams; ``climbs`` for
+      one that searches for climbs; ``spare`` for a process that is ready to replace one that ends.
     - ``state``: ``starting``, ``idle`` or ``working``.
     - ``resident``: memory in use [bytes]; null where the system does not report it.
     """
 
     pid: int | None
-    purpose: Literal["questions", "streams", "spare"]
+    purpose: Literal["questions", "streams", "climbs", "spare"]
     state: Literal["starting", "idle", "working"]
     resident: int | None
 

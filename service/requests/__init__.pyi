@@ -1,3 +1,9 @@
+from .climb import (
+    CancelRequest as CancelRequest,
+    ClimbEnd as ClimbEnd,
+    ClimbRequest as ClimbRequest,
+    EndHand as EndHand,
+)
 from .holds import (
     Cylinder as Cylinder,
     Edge as Edge,
@@ -17,6 +23,7 @@ from .questions import (
     DiagnosisRequest as DiagnosisRequest,
     Draw as Draw,
     LostTiles as LostTiles,
+    Move as Move,
     PlanRequest as PlanRequest,
     PlanWant as PlanWant,
     RouteRequest as RouteRequest,
@@ -31,6 +38,7 @@ from .request import (
     LONGEST_DEADLINE as LONGEST_DEADLINE,
     Detail as Detail,
     Identifier as Identifier,
+    InParts as InParts,
     Later as Later,
     Pose as Pose,
     Query as Query,

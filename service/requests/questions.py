@@ -24,6 +24,7 @@ from planner import (
 from service.requests.request import (
     Detail,
     Identifier,
+    InParts,
     Later,
     Pose,
     Query,
@@ -38,6 +39,8 @@ __all__ = [
     "DiagnosisRequest",
     "Draw",
     "LostTiles",
+    "Move",
+    "ObjectiveName",
     "PlanRequest",
     "PlanWant",
     "RouteRequest",
@@ -361,8 +364,11 @@ class RouteRequest(Query, frozen=True, kw_only=True):
     - ``objective``: as in a plan's request, for every stance.
     - ``limits``: the cap on the utilisation, and the caller's own limits, for every stance.
     - ``moves``: the moves in climbing order.
+    - ``end``: pose of B in W to which the body shifts after all moves.
     - ``explain``: false leaves out the certificates of stances that are overloaded or infeasible.
     - ``want``: names of further results: ``spread`` of every stance, and ``trajectory``.
+    - ``parts``: over zenoh, the knots of a trajectory come move by move, in replies of their own
+      before the last one, which then has none.
     - ``draws``: samples of uncertain parameters for the spread and ``max_robust``; by default the
       bundled samples.
     """
@@ -373,6 +379,9 @@ class RouteRequest(Query, frozen=True, kw_only=True):
     objective: ObjectiveName = "max_margin"
     limits: Limits = Limits()
     moves: Annotated[list[Move], Meta(max_length=10_000)]
+    end: Annotated[
+        Pose | None, Meta(description="of B in W, to which the body shifts after all moves")
+    ] = None
     explain: Explain = True
     want: Annotated[
         list[Literal["spread", "trajectory"]],
@@ -381,4 +390,5 @@ class RouteRequest(Query, frozen=True, kw_only=True):
             "robot moves between the stances: the knots of the climb"
         ),
     ] = []
+    parts: InParts = False
     draws: Draws = []

@@ -18,6 +18,7 @@ __all__ = [
     "Detail",
     "FourTensions",
     "Identifier",
+    "InParts",
     "Later",
     "Pose",
     "Query",
@@ -74,6 +75,13 @@ Detail = Annotated[
     Meta(
         description="how much the reply has: set-points of tendons; the hands' loads, too; or the "
         "whole plan. By default the whole; where max_reply_bytes is given, as much as fits"
+    ),
+]
+InParts = Annotated[
+    bool,
+    Meta(
+        description="over zenoh, replies of their own before the last one: how far a search is, "
+        "and the knots of a trajectory move by move, which the last reply then leaves out"
     ),
 ]
 Later = Annotated[Any, Meta(description="not supported in this version; leave it out")]

@@ -9,7 +9,7 @@ from .config import (
     start_zenoh_log as start_zenoh_log,
     zenoh_config as zenoh_config,
 )
-from .log_lines import JsonLines as JsonLines, LogThread as LogThread
+from .monitor import JsonLines as JsonLines, LogThread as LogThread
 from .player import climb_set_points as climb_set_points, play as play
 from .server import PlanService as PlanService
 from .settings import SERVING_SETTINGS as SERVING_SETTINGS

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
-import secrets
 import threading
 import time
+import uuid
+from collections.abc import Callable
+from contextlib import suppress
 from queue import SimpleQueue
 from typing import Self, TypeVar
 
@@ -14,12 +15,15 @@ import zenoh
 from msgspec import UNSET
 from zenoh.handlers import Callback
 
-from hand_models.base import InvalidInputError
+from hand_models.base import CruxError, InvalidInputError
 from service.replies import (
     BodySpaceReply,
     BriefPlanReply,
+    CancelReply,
+    ClimbReply,
     DiagnosisReply,
     ErrorReply,
+    PartReply,
     PlanReply,
     Reply,
     RouteReply,
@@ -30,16 +34,19 @@ from service.replies import (
 from service.requests import (
     LONGEST_DEADLINE,
     BodySpaceRequest,
+    CancelRequest,
+    ClimbRequest,
     DiagnosisRequest,
     PlanRequest,
     Query,
+    Request,
     RouteRequest,
     SetPointsRequest,
     StreamRequest,
     WrenchSpaceRequest,
 )
 from service.serving.config import open_session, patient
-from service.serving.names import digest
+from service.serving.names import ClientIdentity
 from service.serving.settings import SERVING_SETTINGS
 from service.wire import (
     DEFAULT_ROBOT,
@@ -56,6 +63,7 @@ from service.wire import (
 __all__ = ["CruxClient"]
 
 ReplyT = TypeVar("ReplyT", bound=Reply)
+Parts = Callable[[PartReply], None]
 
 
 class CruxClient:
@@ -116,20 +124,7 @@ class CruxClient:
             self._session = self._owned = self._opened(where, wait)
         else:
             self._session = where
-        # by these a service gives each client its turn, and knows who has gone
-        self._asked = itertools.count()
-        self._source = self._session.declare_querier(service_key(robot, ServiceName.PLAN))
-        here = service_key(robot, f"{ServiceName.CLIENTS}/{self._session.info.zid()}")
-        self._here = self._session.liveliness().declare_token(here)
-        # and by this that nobody else asks in its name
-        self._secret = secrets.token_bytes(16)
-        proof = digest(self._secret)
-
-        def prove(query: zenoh.Query) -> None:
-            with query:
-                query.reply(here, proof)
-
-        self._proof = self._session.declare_queryable(here, Callback(prove, indirect=False))
+        self._identity = ClientIdentity(self._session, robot)
         if wait is not None:
             try:
                 self._await(wait, begun)
@@ -177,9 +172,7 @@ class CruxClient:
     def close(self) -> None:
         """Withdraw the client's zenoh declarations; close the session if the client opened it."""
         if not self._session.is_closed():
-            self._here.undeclare()
-            self._proof.undeclare()
-            self._source.undeclare()
+            self._identity.withdraw()
         if self._owned is not None:
             self._owned.close()
 
@@ -222,12 +215,75 @@ class CruxClient:
         """
         return _read(self._ask(ServiceName.BODY_SPACE, request), BodySpaceReply)
 
-    def route(self, request: RouteRequest) -> RouteReply:
+    def route(self, request: RouteRequest, parts: Parts | None = None) -> RouteReply:
         """Send a request for a climb and return its stages, and the trajectory if it is wanted.
 
-        Raises the errors that `plan` raises.
+        Parameters
+        ----------
+        request : RouteRequest
+        parts : callable, optional
+            Takes the knots of a trajectory move by move, as soon as they are planned; the reply
+            then has none. By default the reply has all.
+
+        Raises
+        ------
+        CruxError
+            As `plan` raises.
         """
-        return _read(self._ask(ServiceName.ROUTE, request), RouteReply)
+        if parts is not None:
+            request = msgspec.structs.replace(request, parts=True)
+        return _read(self._ask(ServiceName.ROUTE, request, parts), RouteReply)
+
+    def climb(self, request: ClimbRequest, parts: Parts | None = None) -> ClimbReply:
+        """Search for the best climb on a rock and return it, with a bound of every other.
+
+        An exception meanwhile, such as Ctrl-C or one of ``parts``, cancels the search.
+
+        Parameters
+        ----------
+        request : ClimbRequest
+            Without ``deadline`` and `timeout`, it is sent with the longest deadline there is.
+        parts : callable, optional
+            Takes how far the search is, several times a second at most; and the knots of a
+            trajectory move by move, which the reply then leaves out.
+
+        Raises
+        ------
+        CruxError
+            As `plan` raises.
+        """
+        if parts is not None:
+            request = msgspec.structs.replace(request, parts=True)
+        if request.deadline is None and self.timeout is None:
+            request = msgspec.structs.replace(request, deadline=LONGEST_DEADLINE)
+        identifier = request.id or uuid.uuid4().hex
+        request = msgspec.structs.replace(request, id=identifier)
+        try:
+            return _read(self._ask(ServiceName.CLIMB, request, parts), ClimbReply)
+        except CruxError:
+            raise
+        except BaseException:
+            # a service that has ended needs no word
+            with suppress(CruxError):
+                self.cancel(identifier)
+            raise
+
+    def cancel(self, identifier: str) -> int:
+        """Cancel this client's questions of an ``id``: those that wait, and climbs in work.
+
+        Returns
+        -------
+        int
+            Number of questions that have ended by this, with errors of kind ``cancelled``.
+
+        Raises
+        ------
+        CruxError
+            As `plan` raises.
+        """
+        request = CancelRequest(v=1, id=identifier)
+        waits = self.timeout or SERVING_SETTINGS.client_timeout
+        return _read(self._answer(ServiceName.CANCEL, request, waits), CancelReply).cancelled
 
     def stream(self, request: StreamRequest) -> StreamReply:
         """Declare a stance as a stream of body wrenches; the reply has the stream's identifier.
@@ -250,9 +306,9 @@ class CruxClient:
         """
         return _read(self._ask(ServiceName.DIAGNOSIS, request), DiagnosisReply)
 
-    def _ask(self, name: str, request: Query) -> zenoh.Sample:
+    def _ask(self, name: str, request: Query, parts: Parts | None = None) -> zenoh.Sample:
         """Return the reply that is no error; raise what `plan` raises."""
-        key, waits = service_key(self.robot, name), self.timeout
+        waits = self.timeout
         # of the time that the client waits, for the answer
         part = 0.9
         if waits is None:
@@ -261,11 +317,18 @@ class CruxClient:
             # nobody waits for an answer that comes later
             own = min(part * waits, LONGEST_DEADLINE)
             request = msgspec.structs.replace(request, deadline=own)
-        reply = self._get(key, request, waits)
+        return self._answer(name, request, waits, parts)
+
+    def _answer(
+        self, name: str, request: Request, waits: float, parts: Parts | None = None
+    ) -> zenoh.Sample:
+        """Return the reply to a request that is no error, within so many seconds."""
+        key = service_key(self.robot, name)
+        reply = self._get(key, request, waits, parts)
         if reply is None:
             # [s] a service that has just come back needs it
             time.sleep(0.3)
-            reply = self._get(key, request, waits)
+            reply = self._get(key, request, waits, parts)
         if reply is None:
             raise NoServiceError(
                 f"no service answers at {key}; {_how_to_start()}, or wait for it (wait, --wait)"
@@ -285,8 +348,13 @@ class CruxClient:
             retry_after=None if detail.retry_after is UNSET else detail.retry_after,
         )
 
-    def _get(self, key: str, request: Query, timeout: float) -> zenoh.Reply | None:
-        """Return the first reply that is no error, else the first error, or None without any."""
+    def _get(
+        self, key: str, request: Request, timeout: float, parts: Parts | None = None
+    ) -> zenoh.Reply | None:
+        """Return the first last reply that is no error, else the first error, or None without any.
+
+        Parts that come before it are taken of one server.
+        """
         payload = self.form.encode(request)
         # what is larger, a service does not take in, and so cannot answer
         check_size(len(payload), type(request))
@@ -298,15 +366,23 @@ class CruxClient:
             encoding=self.form.label(request),
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=timeout,
-            source_info=zenoh.SourceInfo(self._source.id, next(self._asked)),
-            attachment=self._secret,
+            source_info=self._identity.source(),
+            attachment=self._identity.secret,
         )
-        error = None
+        error = server = None
         while (reply := replies.get()) is not None:
-            if reply.ok is not None:
+            if reply.ok is None:
+                # of servers that are linked, one may not know the stream that another has
+                error = error or reply
+            elif server not in (None, str(reply.replier_id)):
+                continue
+            elif parts is None or not Format.is_labelled(str(reply.ok.encoding), PartReply):
                 return reply
-            # of servers that are linked, one may not know the stream that another has
-            error = error or reply
+            else:
+                server = str(reply.replier_id)
+                parts(_read(reply.ok, PartReply))
+        if server is not None and error is None:
+            raise NoServiceError(f"the service at {key} ended before it had answered; ask again")
         return error
 
 

@@ -3,8 +3,8 @@
 Questions wait in queues by their kind (scheduling with priority queues): set-points; short
 questions about known stances; other questions; and questions that may take long. The last kind
 leaves one worker to the others. In each queue, the client that has used least of the workers' time
-is next. A separate worker has the streams and a lane for short questions. A question past its
-deadline is ended, and its worker killed if need be.
+is next. A separate worker has the streams and a lane for short questions; climbs have workers of
+their own. A question past its deadline is ended, and its worker killed if need be.
 """
 
 from __future__ import annotations
@@ -15,16 +15,18 @@ import threading
 import time
 from collections.abc import Callable
 from functools import partial
-from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from queue import Empty, SimpleQueue
 from typing import cast
 
 import zenoh
 
-from hand_models.base import CruxError
+from hand_models.base import CruxError, InvalidInputError
 from planner import DeadlineError, PriorityLane, WorkerHandle
 from service.processes import Job
+from service.replies import CancelReply
+from service.requests import CancelRequest
+from service.serving.inbox import Inbox
 from service.serving.monitor import ServiceMonitor, ServiceState
 from service.serving.names import ClientNames
 from service.serving.question import PendingQuestion, client_of, received_question
@@ -33,7 +35,7 @@ from service.serving.settings import SERVING_SETTINGS
 from service.serving.shares import Shares
 from service.serving.waiting import Costs, Kind, Waiting
 from service.serving.worker_pool import WorkerPool
-from service.wire import Answer, Format, LostError, ServiceName, encode_error
+from service.wire import Answer, CancelledError, LostError, ServiceName, decode_request
 
 __all__ = ["Dispatcher"]
 
@@ -80,10 +82,7 @@ class Dispatcher:
         self._started = threading.Event()
         self._stops_at: float | None = None
         self._quiet_from = 0.0
-        self._inbox: SimpleQueue[Callable[[], None]] = SimpleQueue()
-        self._woken, self._waker = Pipe(duplex=False)
-        self._bell = threading.Lock()
-        self._rung = False
+        self._inbox = Inbox()
         self._thread = threading.Thread(target=self._run, name="crux-dispatcher", daemon=True)
 
     def start(self) -> None:
@@ -108,7 +107,7 @@ class Dispatcher:
 
     def ask(self, query: zenoh.Query, key: str) -> None:
         """Put a query, which arrived at a key, into its queue; returns at once."""
-        self._post(partial(self._admit, query, key, time.perf_counter()))
+        self._inbox.post(partial(self._admit, query, key, time.perf_counter()))
 
     def look(self, make_answer: Callable[[], Answer], query: zenoh.Query, key: str) -> None:
         """Answer an operator's query, such as for health, in the background; returns at once.
@@ -122,17 +121,17 @@ class Dispatcher:
 
     def linked(self, client: str) -> None:
         """Record that a client's session has a link to the service's own session."""
-        self._post(partial(self._names.linked.add, client))
+        self._inbox.post(partial(self._names.linked.add, client))
 
     def proven(self, client: str, proof: bytes) -> None:
         """Record the digest that a client's session has sent as proof of its identifier.
 
         Waiting questions with that identifier are put into their queues anew.
         """
-        self._post(partial(self._prove, client, proof))
+        self._inbox.post(partial(self._prove, client, proof))
 
     def gone(self, client: str, *, token: bool = False) -> None:
-        """Drop the waiting questions of a client that has disconnected; those in work go on.
+        """Drop waiting questions and climbs of a client that has disconnected; others go on.
 
         Parameters
         ----------
@@ -143,29 +142,18 @@ class Dispatcher:
             link. A token is believed only for a client that has proven its identifier and has no
             link.
         """
-        self._post(partial(self._drop, client, token))
+        self._inbox.post(partial(self._drop, client, token))
 
     def stop(self) -> None:
         """Refuse waiting and new questions, wait up to 2 s for those in work, end the workers."""
-        self._post(self._end)
+        self._inbox.post(self._end)
         self._thread.join()
 
     def close(self) -> None:
         """Refuse questions that came after `stop`; wait up to 1 s for replies to be sent."""
-        while not self._inbox.empty():
+        while not self._inbox.empty:
             self._take_in()
         self._replies.close()
-
-    def _post(self, event: Callable[[], None]) -> None:
-        """Let the dispatcher's own thread do something; all that follows is in it."""
-        self._inbox.put(event)
-        self._ring()
-
-    def _ring(self) -> None:
-        with self._bell:
-            if not self._rung:
-                self._rung = True
-                self._waker.send_bytes(b"!")
 
     def _run(self) -> None:
         while not self._ended():
@@ -181,18 +169,18 @@ class Dispatcher:
 
     def _step(self) -> None:
         if self._stops_at is None:
-            self._pool.start_worker()
+            self._pool.start_worker(climbs=self._waiting.count(Kind.CLIMB))
             self._deal()
         pipes = self._pool.pipes
-        ready = wait([self._woken, *pipes], self._pause())
+        ready = wait([self._inbox.pipe, *pipes], self._pause())
         for pipe in ready:
             if (
-                pipe is not self._woken
+                pipe is not self._inbox.pipe
                 # not of a process whose end another lane has reported meanwhile
                 and (lane := pipes[cast(Connection, pipe)]).handle in self._pool.handles
             ):
                 self._take_back(lane)
-        if self._woken in ready:
+        if self._inbox.pipe in ready:
             if len(ready) > 1 and self._stops_at is None:
                 # no lane waits for what has come
                 self._deal()
@@ -203,18 +191,8 @@ class Dispatcher:
 
     def _take_in(self) -> None:
         """Do what other threads have posted."""
-        if self._woken.poll():
-            self._woken.recv_bytes()
-        with self._bell:
-            self._rung = False
-        # most events that are taken in before processes are looked at again
-        for _ in range(32):
-            try:
-                event = self._inbox.get_nowait()
-            except Empty:
-                return
+        for event in self._inbox.take():
             self._guarded(event)
-        self._ring()
 
     def _pause(self) -> float | None:
         """Return how long there is nothing to do unless something comes [s]."""
@@ -238,9 +216,7 @@ class Dispatcher:
             question = received_question(query, key, arrived, self._seconds)
         except Exception:
             log.exception("a query at %s cannot be read", key)
-            unread = CruxError("the service could not read the query; see its log")
-            answer = encode_error(unread, Format.JSON, kind="internal")
-            self._replies.later(SharedQueue.UNREAD, partial(reply_to, query, key, lambda: answer))
+            self._replies.unread(query, key)
             return
         if self._stops_at is not None:
             self._replies.ending(question)
@@ -252,6 +228,9 @@ class Dispatcher:
         question.place = self._names.place(question.client, question.secret)
         if self._inquire and self._names.is_to_prove(question.client, question.secret):
             self._replies.later(SharedQueue.INQUIRIES, partial(self._inquire, question.client))
+        if question.name == ServiceName.CANCEL:
+            self._cancel(question)
+            return
         self._shares.asks(question.place)
         self._put(self._costs.kind(question), question)
 
@@ -265,11 +244,39 @@ class Dispatcher:
         for kind, question in self._waiting.take_out(lambda each: each.client == client):
             question.place = self._names.place(client, question.secret)
             self._put(kind, question)
+        for asked in self._pool.left():
+            if asked.client == client:
+                asked.place = self._names.place(client, asked.secret)
+
+    def _cancel(self, question: PendingQuestion) -> None:
+        """Stop the questions of a client that have the id which it names."""
+        try:
+            asked = decode_request(question.payload, CancelRequest, question.form)
+        except InvalidInputError as error:
+            self._replies.refuse(question, error)
+            return
+        named, why = (question.place, asked.id), CancelledError("cancelled by its client")
+        count = self._stop(lambda each: (each.place, each.id) == named, why, why.kind)
+        reply, form = CancelReply(id=asked.id, cancelled=count), question.form
+        self._replies.reply(question, Answer(form.encode(reply), form.label(reply)))
+
+    def _stop(self, which: Callable[[PendingQuestion], bool], error: CruxError, kind: str) -> int:
+        """Refuse questions that wait, and climbs in work, whose workers end; count them.
+
+        Other questions in work go on: they take less time than a worker takes to start.
+        """
+        climbs = self._pool.stop_climbs(which)
+        for climb in climbs:
+            self._shares.charge(climb.place, self._shares.start)
+        stopped = [*self._waiting.remove(which), *climbs]
+        for question in stopped:
+            self._replies.refuse(question, error, kind)
+        return len(stopped)
 
     def _deal(self) -> None:
         """Give lanes that have nothing to do the questions whose turn it is."""
         idle = self._pool.idle()
-        others = [lane for lane in idle if not self._pool.has_streams(lane)]
+        others = [lane for lane in idle if self._pool.answers_any(lane)]
         while others and (question := self._waiting.next(dear=self._pool.takes_dear())):
             knows, stance = self._costs.knows, question.stance
             knowing = [lane for lane in others if knows(lane.handle, stance)]
@@ -277,11 +284,7 @@ class Dispatcher:
             others.remove(lane)
             self._give(lane, question)
         for lane in idle:
-            if not self._pool.has_streams(lane):
-                continue
-            short = (Kind.DECLARED, Kind.SHORT)
-            kinds = (Kind.SET_POINTS,) if self._pool.is_for_set_points(lane) else short
-            if question := self._waiting.take(*kinds):
+            if question := self._waiting.take(*self._pool.kinds(lane)):
                 self._give(lane, question)
 
     def _give(self, lane: PriorityLane[Job, Answer], question: PendingQuestion) -> None:
@@ -297,8 +300,7 @@ class Dispatcher:
         names.gone(client)
         self._shares.gone(client)
         gone = LostError("the client disconnected: its link or its liveliness token is gone")
-        for question in self._waiting.remove(lambda each: each.place == client):
-            self._replies.refuse(question, gone, "gone")
+        self._stop(lambda each: each.place == client, gone, "gone")
 
     # answers -------------------------------------------------------------------------------------
 
@@ -320,10 +322,15 @@ class Dispatcher:
             self._shares.start = self._pool.start or self._shares.start
             return
         asked = self._pool.work[lane]
-        self._pool.work[lane] = None
         assert asked is not None
+        if not done.last:
+            if not asked.replied:
+                self._replies.part(asked, done)
+            return
+        self._pool.work[lane] = None
         cost = done.cost or done.seconds
-        self._shares.charge(asked.place, cost)
+        if asked.name != ServiceName.CLIMB:  # whose worker others do not wait for
+            self._shares.charge(asked.place, cost)
         if asked.name == ServiceName.PLAN and asked.stance is not None:
             self._costs.took(asked.stance, lane.handle, cost)
         if asked.name == ServiceName.STREAM and not asked.rehearsed and done.good:
@@ -365,7 +372,7 @@ class Dispatcher:
         if threading.current_thread() is self._thread or not self._thread.is_alive():
             return ServiceState(self._pool.states(), self._waiting.counts())
         found: SimpleQueue[ServiceState] = SimpleQueue()
-        self._post(lambda: found.put(self._state()))
+        self._inbox.post(lambda: found.put(self._state()))
         try:
             return found.get(timeout=1.0)
         except Empty:

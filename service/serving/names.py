@@ -10,18 +10,64 @@ known session has, share one anonymous place.
 from __future__ import annotations
 
 import hashlib
+import itertools
+import secrets
 import time
 
+import zenoh
 from cachetools import LRUCache, TTLCache
+from zenoh.handlers import Callback
 
 from service.serving.settings import SERVING_SETTINGS
+from service.wire import ServiceName, service_key
 
-__all__ = ["ClientNames", "digest"]
+__all__ = ["ClientIdentity", "ClientNames", "digest"]
 
 
 def digest(secret: bytes) -> bytes:
     """Return the SHA-256 digest of a client's secret, 32 bytes."""
     return hashlib.sha256(secret).digest()
+
+
+class ClientIdentity:
+    """What a client declares, so that a service gives it its turns and knows when it has gone.
+
+    Parameters
+    ----------
+    session : zenoh.Session
+        The client's session.
+    robot : str
+        Name of the robot whose service is asked.
+
+    Attributes
+    ----------
+    secret : bytes
+        Attachment of the client's queries; its digest proves that nobody else asks in its name.
+    """
+
+    def __init__(self, session: zenoh.Session, robot: str) -> None:
+        self._asked = itertools.count()
+        self._querier = session.declare_querier(service_key(robot, ServiceName.PLAN))
+        here = service_key(robot, f"{ServiceName.CLIENTS}/{session.info.zid()}")
+        self._token = session.liveliness().declare_token(here)
+        self.secret = secrets.token_bytes(16)
+        proof = digest(self.secret)
+
+        def prove(query: zenoh.Query) -> None:
+            with query:
+                query.reply(here, proof)
+
+        self._proof = session.declare_queryable(here, Callback(prove, indirect=False))
+
+    def source(self) -> zenoh.SourceInfo:
+        """Return the identifier of the session, with the number of the next query."""
+        return zenoh.SourceInfo(self._querier.id, next(self._asked))
+
+    def withdraw(self) -> None:
+        """Withdraw the declarations."""
+        self._token.undeclare()
+        self._proof.undeclare()
+        self._querier.undeclare()
 
 
 class ClientNames:

@@ -11,7 +11,7 @@ import zenoh
 from hand_models.base import CruxError, LimitError
 from service.answering import SERVICES_BY_NAME
 from service.processes import Job
-from service.requests import LEAST_REPLY_BYTES, LONGEST_DEADLINE
+from service.requests import LEAST_REPLY_BYTES, LONGEST_DEADLINE, CancelRequest
 from service.serving.settings import SERVING_SETTINGS
 from service.wire import (
     LARGEST_ERROR,
@@ -46,7 +46,7 @@ class PendingQuestion:
     Attributes
     ----------
     query : zenoh.Query
-        The zenoh query, which gets exactly one reply.
+        The zenoh query, which gets exactly one last reply, and before it parts if it asks for them.
     key : str
         Key at which the query arrived.
     name : str
@@ -79,7 +79,9 @@ class PendingQuestion:
     fault : LimitError or None
         Error for a payload or an attachment with too many bytes, whose bytes are then not kept.
     replied : bool
-        True after the reply.
+        True after the last reply.
+    replies_by : str
+        Queue by which all replies to the question are sent; empty before the first.
     begun : float
         Time at which a worker got the question; negative before.
     """
@@ -99,6 +101,7 @@ class PendingQuestion:
     rehearsed: bool = False
     fault: LimitError | None = None
     replied: bool = False
+    replies_by: str = ""
     begun: float = -1.0
     place: str = ""
     secret: bytes = b""
@@ -146,8 +149,8 @@ def received_question(
 ) -> PendingQuestion:
     """Return a query as a pending question, with its payload copied and its main fields read.
 
-    Payloads above 1 MiB are not decoded here; a worker reads them. A payload or attachment with too
-    many bytes is not copied, and the question's ``fault`` is set.
+    Payloads above 1 MiB are not decoded here, except for climbs; a worker reads them. A payload or
+    attachment with too many bytes is not copied, and the question's ``fault`` is set.
 
     Parameters
     ----------
@@ -174,7 +177,8 @@ def received_question(
                 )
             secret = attached.to_bytes()
         if given is not None:
-            check_size(len(given), SERVICES_BY_NAME[name].request)
+            cancels = name == ServiceName.CANCEL
+            check_size(len(given), CancelRequest if cancels else SERVICES_BY_NAME[name].request)
             payload = given.to_bytes()
     except LimitError as error:
         fault = error
@@ -192,8 +196,8 @@ def received_question(
         fault=fault,
         secret=secret,
     )
-    # a process reads larger ones
-    if len(payload) <= 2**20:
+    # a process reads larger ones; of a climb the deadline must be known: a scan takes 1 ms a MB
+    if len(payload) <= 2**20 or name == ServiceName.CLIMB:
         _read(question)
     return question
 

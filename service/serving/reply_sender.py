@@ -20,7 +20,7 @@ import zenoh
 from hand_models.base import CruxError
 from service.serving.monitor import ServiceMonitor
 from service.serving.question import PendingQuestion
-from service.wire import Answer, BusyError
+from service.wire import Answer, BusyError, Format, encode_error
 
 __all__ = ["Replies", "ReplySender", "SharedQueue", "reply_to"]
 
@@ -124,7 +124,7 @@ def reply_to(query: zenoh.Query, key: str, make_answer: Callable[[], Answer]) ->
 
 
 class Replies:
-    """Replies of a service: one for each question, sent in the background and counted by a monitor.
+    """Replies of a service to questions, sent in the background; a monitor counts the last ones.
 
     Parameters
     ----------
@@ -190,6 +190,18 @@ class Replies:
         """Refuse a question as busy because the service is shutting down; retry after 10 s."""
         self.refuse(question, BusyError("the service is shutting down", self._longest_retry))
 
+    def unread(self, query: zenoh.Query, key: str) -> None:
+        """Reply to a query that could not be read, for an unknown cause."""
+        unread = CruxError("the service could not read the query; see its log")
+        answer = encode_error(unread, Format.JSON, kind="internal")
+        self.later(SharedQueue.UNREAD, partial(reply_to, query, key, lambda: answer))
+
+    def part(self, question: PendingQuestion, answer: Answer) -> None:
+        """Send a part of an answer in the background; the question is still to be answered."""
+        query, key = question.query, question.key
+        send = partial(query.reply, key, answer.payload, encoding=answer.encoding)
+        self._sender.send(self._queue_of(question), send)
+
     def reply(self, question: PendingQuestion, answer: Answer) -> None:
         """Send an answer to a question in the background, and count the answer."""
         if answer.seconds > 0.0:
@@ -197,10 +209,15 @@ class Replies:
             self._mean += (answer.seconds - self._mean) / 20
         question.replied, question.payload = True, b""
         self._monitor.count(question, answer.status, answer.seconds)
-        # clients without a known name share 8 queues
-        self._unnamed = (self._unnamed + 1) % 8
         send = partial(reply_to, question.query, question.key, lambda: answer)
-        self._sender.send(question.place or str(self._unnamed), send)
+        self._sender.send(self._queue_of(question), send)
+
+    def _queue_of(self, question: PendingQuestion) -> str:
+        """Return the queue of all replies to a question: its client's, or one of 8 shared ones."""
+        if not question.replies_by:
+            self._unnamed = (self._unnamed + 1) % 8
+            question.replies_by = question.place or str(self._unnamed)
+        return question.replies_by
 
     def close(self) -> None:
         """Wait up to 1 s for replies that are being sent, and end the sender's threads."""

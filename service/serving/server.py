@@ -91,7 +91,8 @@ class PlanService:
                 field="seconds",
             )
         (self.robot,) = robots_of(robot)
-        self.keys = tuple(service_key(self.robot, name) for name in SERVICES_BY_NAME)
+        names = (*SERVICES_BY_NAME, ServiceName.CANCEL)
+        self.keys = tuple(service_key(self.robot, name) for name in names)
         self.operators = tuple(
             service_key(self.robot, name) for name in (ServiceName.HEALTH, ServiceName.METRICS)
         )

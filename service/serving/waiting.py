@@ -38,6 +38,8 @@ class Kind(Enum):
     OTHER = "other"
     DEAR = "dear"
     """Questions that may take long."""
+    CLIMB = "climb"
+    """Searches for climbs, which have workers of their own."""
 
 
 class _Stance:
@@ -83,6 +85,8 @@ class Costs:
         """Return the kind of queue in which a question must wait."""
         if question.name == ServiceName.SET_POINTS:
             return Kind.SET_POINTS
+        if question.name == ServiceName.CLIMB:
+            return Kind.CLIMB
         if question.dear:
             return Kind.DEAR
         if question.name == ServiceName.PLAN and self.is_short(question.stance):
@@ -142,7 +146,11 @@ class Waiting:
 
     def counts(self) -> dict[str, int]:
         """Return the number of waiting questions, by the kind of their queue."""
-        return {kind.value: len(queue) for kind, queue in self._queues.items()}
+        return {kind.value: self.count(kind) for kind in Kind}
+
+    def count(self, kind: Kind) -> int:
+        """Return the number of waiting questions of a kind."""
+        return len(self._queues[kind])
 
     def _fits(self, question: PendingQuestion) -> bool:
         """Return whether there is room for a question; bytes are limited only for large ones."""

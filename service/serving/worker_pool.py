@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Literal
 
@@ -12,17 +13,18 @@ from service.processes import Job
 from service.replies import ProcessHealth
 from service.serving.question import PendingQuestion
 from service.serving.settings import SERVING_SETTINGS
+from service.serving.waiting import Kind
 from service.wire import Answer
 
 __all__ = ["WorkerPool"]
 
 log = logging.getLogger(__name__)
 
-Purpose = Literal["questions", "streams", "spare"]
+Purpose = Literal["questions", "streams", "climbs", "spare"]
 
 
 class WorkerPool:
-    """Workers of a service: some for questions, one for streams, and a spare as replacement.
+    """Workers of a service: for questions, for streams, a spare, and for climbs once there are any.
 
     Parameters
     ----------
@@ -37,6 +39,8 @@ class WorkerPool:
     ----------
     workers : int
         Number of workers that answer questions.
+    climbs : int
+        Most climbs that are searched for at a time: half of ``workers``, but at least one.
     work : dict of PriorityLane to PendingQuestion or None
         Question that each lane of a worker is answering; None for an idle lane.
     rests_until : float
@@ -49,6 +53,7 @@ class WorkerPool:
 
     def __init__(self, make: Make[Job, Answer], workers: int, memory: int) -> None:
         self._make, self.workers, self._memory = make, workers, memory
+        self.climbs = max(1, workers // 2)
         self.work: dict[PriorityLane[Job, Answer], PendingQuestion | None] = {}
         self.rests_until = 0.0
         self.failed_starts = 0
@@ -77,14 +82,18 @@ class WorkerPool:
     def _ready(self, purpose: Purpose) -> list[WorkerHandle[Job, Answer]]:
         return [each for each in self._all(purpose) if each.ready]
 
-    def start_worker(self) -> None:
+    def start_worker(self, climbs: int = 0) -> None:
         """Start missing workers, or use the spare; then start a new spare if all others are ready.
 
+        ``climbs``: number of climbs that wait for a worker; without any, none is started for them.
         Where the operating system refuses a process, a warning is logged and no worker is started
         for a while.
         """
         wanted: list[Purpose] = [] if self._all("streams") else ["streams"]
         wanted += ["questions"] * (self.workers - len(self._all("questions")))
+        climbing = self._all("climbs")
+        at_work = sum(self.work[handle.lanes[0]] is not None for handle in climbing)
+        wanted += ["climbs"] * (min(at_work + climbs, self.climbs) - len(climbing))
         try:
             for purpose in wanted:
                 spare = self._all("spare")
@@ -98,10 +107,10 @@ class WorkerPool:
             log.warning("no process can be started, again in %g s: %s", rest, error)
 
     def put(self, handle: WorkerHandle[Job, Answer], purpose: Purpose) -> None:
-        """Assign a worker its purpose: ``questions``, ``streams`` or ``spare``."""
+        """Assign a worker its purpose: ``questions``, ``streams``, ``climbs`` or ``spare``."""
         self._purposes[handle] = purpose
         # with the streams, one lane for set-points, and one for what else is short
-        lanes: dict[Purpose, int] = {"streams": 2, "questions": 1, "spare": 0}
+        lanes: dict[Purpose, int] = {"streams": 2, "questions": 1, "climbs": 1, "spare": 0}
         self.work |= dict.fromkeys(handle.lanes[: lanes[purpose]])
 
     def _started(self) -> WorkerHandle[Job, Answer] | None:
@@ -129,10 +138,18 @@ class WorkerPool:
         """Return whether a lane belongs to the worker that keeps the streams."""
         return self._purposes.get(lane.handle) == "streams"
 
-    def is_for_set_points(self, lane: PriorityLane[Job, Answer]) -> bool:
-        """Return whether a lane is reserved for set-points: the first of the streams' worker."""
-        # the first of two
-        return self.has_streams(lane) and lane.number == 0
+    def answers_any(self, lane: PriorityLane[Job, Answer]) -> bool:
+        """Return whether a lane is for questions of any kind but climbs and set-points."""
+        return self._purposes.get(lane.handle) == "questions"
+
+    def kinds(self, lane: PriorityLane[Job, Answer]) -> tuple[Kind, ...]:
+        """Return the kinds for which a lane is reserved; none for one that answers any."""
+        if self._purposes.get(lane.handle) == "climbs":
+            return (Kind.CLIMB,)
+        if not self.has_streams(lane):
+            return ()
+        # of two lanes, set-points have the first
+        return (Kind.DECLARED, Kind.SHORT) if lane.number else (Kind.SET_POINTS,)
 
     def idle(self) -> list[PriorityLane[Job, Answer]]:
         """Return the lanes of ready workers that have no question to answer."""
@@ -148,7 +165,7 @@ class WorkerPool:
 
         A pool with one worker takes one such question at a time.
         """
-        asked = [each for lane, each in self.work.items() if not self.has_streams(lane)]
+        asked = [each for lane, each in self.work.items() if self.answers_any(lane)]
         dear = sum(each is not None and each.dear for each in asked)
         return dear < (1 if self.workers == 1 else len(self._ready("questions")) - 1)
 
@@ -206,6 +223,14 @@ class WorkerPool:
             self._rest()
         left = [each for each in asked if each is not None and not each.replied]
         return handle.kill(dead=dead), left
+
+    def stop_climbs(self, unwanted: Callable[[PendingQuestion], bool]) -> list[PendingQuestion]:
+        """Kill the workers of climbs that are not wanted any more; return those without a reply."""
+        work = [
+            (lane, asked) for lane, asked in self.work.items() if Kind.CLIMB in self.kinds(lane)
+        ]
+        ends = [lane.handle for lane, asked in work if asked is not None and unwanted(asked)]
+        return [each for handle in ends for each in self.stop_worker(handle)[1]]
 
     def left(self) -> list[PendingQuestion]:
         """Return the questions that workers are answering and that have no reply yet."""

@@ -13,6 +13,7 @@ from .codec import (
 from .errors import (
     REQUEST_KINDS as REQUEST_KINDS,
     BusyError as BusyError,
+    CancelledError as CancelledError,
     LostError as LostError,
     MalformedError as MalformedError,
     NoServiceError as NoServiceError,

@@ -13,7 +13,13 @@ import msgspec
 
 from hand_models.base import CruxError, InvalidInputError, LimitError, UnsupportedError
 from service.replies import ErrorDetail, ErrorReply
-from service.requests import Identifier, ReplyBytes, SetPointsRequest, StreamRequest
+from service.requests import (
+    CancelRequest,
+    Identifier,
+    ReplyBytes,
+    SetPointsRequest,
+    StreamRequest,
+)
 from service.wire.duplicate_keys import refuse_in_json, refuse_in_msgpack
 from service.wire.errors import BusyError, MalformedError
 from service.wire.validation_errors import validation_error
@@ -150,6 +156,8 @@ class Answer(NamedTuple):
         Wall-clock time that the answer took [s].
     cost : float
         Processor time that the answer took [s]; other programs on the machine do not change it.
+    last : bool
+        False for a part of the answer, after which more replies to the same query follow.
     """
 
     payload: bytes
@@ -158,6 +166,7 @@ class Answer(NamedTuple):
     status: str = "done"
     seconds: float = 0.0
     cost: float = 0.0
+    last: bool = True
 
 
 def decode_request(payload: bytes, kind: type[MessageT], form: Format = Format.JSON) -> MessageT:
@@ -240,8 +249,8 @@ def _check(value: object, path: str = "") -> None:
 
 def most_bytes(kind: type) -> int:
     """Return the maximum bytes of a request of a given type; larger payloads are not decoded."""
-    if kind is SetPointsRequest:
-        # it has no rock
+    if kind is SetPointsRequest or kind is CancelRequest:
+        # they have no rock
         return 2**12
     if kind is StreamRequest:
         # streams are kept: sixteen of them have to fit into one process

@@ -9,6 +9,7 @@ from hand_models.base import CruxError, InvalidInputError
 __all__ = [
     "REQUEST_KINDS",
     "BusyError",
+    "CancelledError",
     "LostError",
     "MalformedError",
     "NoServiceError",
@@ -41,6 +42,12 @@ class BusyError(CruxError):
     def __init__(self, message: str, retry_after: float) -> None:
         super().__init__(message)
         self.retry_after = retry_after
+
+
+class CancelledError(CruxError):
+    """Error: the client that asked has cancelled its question."""
+
+    kind = "cancelled"
 
 
 class MalformedError(InvalidInputError):

@@ -11,10 +11,13 @@ from hand_models.parameters import Quantity
 from service.replies import (
     BodySpaceReply,
     BriefPlanReply,
+    CancelReply,
+    ClimbReply,
     ClimbSetPoints,
     DiagnosisReply,
     ErrorReply,
     HealthReply,
+    PartReply,
     PlanReply,
     RouteReply,
     SetPointsReply,
@@ -23,6 +26,8 @@ from service.replies import (
 )
 from service.requests import (
     BodySpaceRequest,
+    CancelRequest,
+    ClimbRequest,
     DiagnosisRequest,
     PlanRequest,
     RouteRequest,
@@ -51,6 +56,11 @@ MESSAGE_KINDS: Final[tuple[type[msgspec.Struct], ...]] = (
     DiagnosisReply,
     RouteRequest,
     RouteReply,
+    ClimbRequest,
+    ClimbReply,
+    PartReply,
+    CancelRequest,
+    CancelReply,
     ClimbSetPoints,
     HealthReply,
     ErrorReply,
@@ -89,7 +99,9 @@ def schema() -> dict[str, Any]:
         ServiceName.STREAM: (StreamRequest, StreamReply),
         ServiceName.SET_POINTS: (SetPointsRequest, SetPointsReply),
         ServiceName.DIAGNOSIS: (DiagnosisRequest, DiagnosisReply),
-        ServiceName.ROUTE: (RouteRequest, RouteReply),
+        ServiceName.ROUTE: (RouteRequest, RouteReply, PartReply),
+        ServiceName.CLIMB: (ClimbRequest, ClimbReply, PartReply),
+        ServiceName.CANCEL: (CancelRequest, CancelReply),
         ServiceName.HEALTH: (None, HealthReply),
     }
     return {

@@ -26,14 +26,24 @@ def tried():
 
 
 def largest_force(settled, up):
-    """Largest force of the rock on a hand along a direction in the rock's frame, by HiGHS [N]."""
+    """Largest force of the rock on a hand along a direction in the rock's frame alone, by HiGHS [N].
+
+    It is None if every force has components across.
+    """
     space, axes = wrench_space(settled), settled.seating.pose.rotation
-    way = -axes @ up @ space.generators[:3]
+    way = axes @ up
+    across = scipy.linalg.null_space(way[None]).T
+    generators, origin = space.generators[:3], space.origin[:3]
     found = scipy.optimize.linprog(
-        -way, A_ub=space.A, b_ub=space.b, bounds=[(None, None)] * len(way)
+        way @ generators,
+        A_ub=space.A,
+        b_ub=space.b,
+        A_eq=across @ generators,
+        b_eq=-across @ origin,
+        bounds=[(None, None)] * len(space.columns),
     )
     assert found.status in (0, 2)
-    return None if found.status else -found.fun - axes @ up @ space.origin[:3]
+    return None if found.status else -found.fun - way @ origin
 
 
 def test_the_hands_that_lift_most_are_kept_at_each_point(tried):

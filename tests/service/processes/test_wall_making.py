@@ -9,7 +9,7 @@ import pytest
 
 from hand_models.base import InvalidInputError
 from hand_models.tile import Surface
-from planner.walls import WallSource, wall_digest
+from planner.walls import BodyGrid, PlaceGrid, WallSource, wall_digest
 from service.processes import make_wall
 from tests.suite.helpers.climbing_walls import tiny_source, tiny_wall
 from tests.suite.helpers.processes import PATIENCE
@@ -65,6 +65,22 @@ def test_chunks_in_a_file_are_not_worked_out_again(tmp_path):
     assert kept.read_bytes() == whole
 
 
+def test_other_bodies_leave_placements_as_they_are(tmp_path):
+    kept, other = (
+        tmp_path / "chunks",
+        replace(tiny_source(), bodies=BodyGrid(margin=0.5, stand_offs=(0.4,))),
+    )
+    alone = make_wall(other, "here")
+    make_wall(tiny_source(), "here", kept=kept)
+    seen = len(kept.read_bytes())
+    made = make_wall(other, "here", kept=kept)
+    assert wall_digest(made.wall) == wall_digest(alone.wall) != wall_digest(tiny_wall().wall)
+    # reach was added, and no hand was closed again
+    again = make_wall(as_a(Unable, other), "here", kept=kept)
+    assert wall_digest(again.wall) == wall_digest(alone.wall)
+    assert 0 < len(kept.read_bytes()) - seen < seen
+
+
 def test_chunks_of_another_wall_are_refused(tmp_path):
     source, kept = tiny_source(), tmp_path / "chunks"
     kept.write_bytes(b"crux finished chunks 1 " + b"0" * 64 + b"\n")
@@ -81,7 +97,7 @@ def test_what_changes_answers_changes_the_digest():
     assert tiny_source().digest == source.digest
     others = [
         replace(source, gravity=0.5 * source.gravity),
-        replace(source, more_bodies=source.poses().poses[:1]),
+        replace(source, places=PlaceGrid(kept=2)),
         replace(source, rock_pose=source.rock_pose @ source.rock_pose),
         replace(source, surface=Surface.named("sandpaper-36")),
     ]

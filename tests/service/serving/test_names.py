@@ -43,8 +43,8 @@ class Asker:
 
     def send(self, asked: dict, **forged: object) -> Iterator[zenoh.Reply]:
         own = {
-            "source_info": zenoh.SourceInfo(self.client._source.id, next(self._numbers)),
-            "attachment": self.client._secret,
+            "source_info": zenoh.SourceInfo(self.client._identity._querier.id, next(self._numbers)),
+            "attachment": self.client._identity.secret,
         }
         payload = json.dumps(asked).encode()
         return self.session.get(PLAN, payload=payload, timeout=PATIENCE, **own | forged)
@@ -106,7 +106,7 @@ def working(health: dict) -> list[dict]:
 def test_a_name_that_is_another_s_takes_no_room_from_him(
     victim: Asker, other: Asker, secret: bytes | None
 ) -> None:
-    source = zenoh.SourceInfo(victim.client._source.id, 7)
+    source = zenoh.SourceInfo(victim.client._identity._querier.id, 7)
     most = SERVING_SETTINGS.waiting_of_client
     forged = [
         other.send({"sleep": 0.02}, source_info=source, attachment=secret) for _ in range(3 * most)
@@ -154,7 +154,7 @@ def test_who_says_that_he_has_gone_is_told_so() -> None:
                     asker.send({"echo": 1, "deadline": LONG}) for asker in (leaving, staying)
                 ]
                 site.wait_until(operator, lambda health: sum(health["waiting"].values()) == 2)
-                leaving.client._here.undeclare()
+                leaving.client._identity._token.undeclare()
                 told = result(waiting[0])
                 assert kind(told) == "lost"
                 assert "the client disconnected" in told["error"]["message"]

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from service import CruxClient
-from service.replies import ClimbFailureReply, KnotReply
+from service.replies import ClimbFailureReply, KnotReply, PartReply
 from service.requests import RouteRequest
 from service.serving import PlanService, open_session, zenoh_config
 from service.wire import ServiceError, decode_request
@@ -52,6 +52,47 @@ def test_a_reply_says_where_a_climb_fails(client):
     reply = client.route(asked(blocked(), "trajectory"))
     assert reply.failure == ClimbFailureReply.of(failed().climb.failure)
     assert (reply.failure.move, reply.trajectory[-1].stage) == (2, 2)
+
+
+def test_knots_come_move_by_move_before_the_last_reply(client):
+    parts: list[PartReply] = []
+    reply = client.route(asked(two_moves(), "trajectory", id="mine"), parts.append)
+    assert (reply.id, reply.status, reply.failure) == ("mine", "optimal", None)
+    assert reply.trajectory is msgspec.UNSET
+    knots = [knot for part in parts for knot in part.knots]
+    assert knots == [KnotReply.of(knot) for knot in climbed().climb.knots]
+    assert [{knot.move for knot in part.knots} for part in parts] == [{0, 1}, {2}]
+    assert {part.id for part in parts} == {"mine"}
+    assert departures("PartReply", msgspec.to_builtins(parts[0])) == []
+
+
+def test_knots_come_in_replies_that_a_small_client_takes(client):
+    parts: list[PartReply] = []
+    small = asked(two_moves(), "trajectory", max_reply_bytes=4096)
+    reply = client.route(small, parts.append)
+    assert reply.status == "optimal"
+    assert all(len(msgspec.msgpack.encode(part)) <= 4096 for part in parts)
+    knots = [knot for part in parts for knot in part.knots]
+    assert knots == [KnotReply.of(knot) for knot in climbed().climb.knots]
+    # one knot takes more than a reply may have: the climb is not planned in vain
+    with pytest.raises(ServiceError, match="and no more than 1000 are allowed") as caught:
+        client.route(asked(two_moves(), "trajectory", max_reply_bytes=1000), parts.append)
+    assert (caught.value.kind, caught.value.field) == ("limit", "max_reply_bytes")
+
+
+def test_a_program_that_gets_one_reply_only_gets_it_whole(client):
+    """In parts, whoever lets zenoh consolidate replies has the last one."""
+    request = msgspec.json.encode(asked(two_moves(), "trajectory", parts=True))
+    (reply,) = client._session.get("crux/robosimian/route", payload=request, timeout=PATIENCE)
+    assert b'"status":"optimal"' in reply.ok.payload.to_bytes()
+
+
+def test_parts_end_with_what_a_failing_move_still_has(client):
+    parts: list[PartReply] = []
+    reply = client.route(asked(blocked(), "trajectory"), parts.append)
+    assert reply.failure == ClimbFailureReply.of(failed().climb.failure)
+    knots = [knot for part in parts for knot in part.knots]
+    assert knots == [KnotReply.of(knot) for knot in failed().climb.knots]
 
 
 def test_without_a_trajectory_stages_alone_are_planned(client):

@@ -53,7 +53,9 @@ STREAM = service_key("robosimian", "stream")
 SET_POINTS = service_key("robosimian", "set_points")
 DIAGNOSIS = service_key("robosimian", "diagnosis")
 ROUTE = service_key("robosimian", "route")
-KEYS = [PLAN, WRENCH_SPACE, BODY_SPACE, DIAGNOSIS, ROUTE, STREAM, SET_POINTS]
+CLIMB = service_key("robosimian", "climb")
+CANCEL = service_key("robosimian", "cancel")
+KEYS = [PLAN, WRENCH_SPACE, BODY_SPACE, DIAGNOSIS, ROUTE, CLIMB, STREAM, SET_POINTS, CANCEL]
 
 
 @pytest.fixture(scope="module")
@@ -309,7 +311,10 @@ def test_a_signal_stops_the_server_cleanly(number: int, busy: bool) -> None:
     refused = [Format.JSON.decode(r.err.payload.to_bytes(), ErrorReply) for r in replies if r.err]
     assert {reply.error.kind for reply in refused} <= {"busy", "lost"}
     assert out == ""
-    assert err.splitlines() == [f"crux: serving {', '.join(KEYS)}; listening on {server.endpoint}"]
+    assert err.splitlines() == [
+        f"crux: listening on {server.endpoint}; the workers start, which takes some seconds",
+        f"crux: ready; serving {', '.join(KEYS)}",
+    ]
 
 
 @pytest.mark.slow
@@ -320,14 +325,14 @@ def test_a_second_server_of_one_robot_warns(served: Served) -> None:
 
     # the first's token may not have been heard of yet
     for _ in range(10):
-        *warnings, serving = said()
+        *warnings, _, serving = said()
         if warnings:
             break
     assert warnings == [
         "crux: another service already answers crux/robosimian/…: queries may reach either; "
         "--no-multicast-scouting keeps services apart"
     ]
-    assert serving.startswith("crux: serving ")
+    assert serving.startswith("crux: ready; serving ")
 
 
 @pytest.mark.slow
@@ -502,8 +507,9 @@ def test_a_port_that_is_the_systems_to_choose_is_told() -> None:
 def test_a_server_that_others_can_reach_says_what_that_exposes() -> None:
     port = free_endpoint().rpartition(":")[2]
     server = Served(f"tcp/0.0.0.0:{port}")
-    serving, exposes = server.stop(signal.SIGTERM)[1].splitlines()
-    assert serving.endswith(f"listening on tcp/0.0.0.0:{port}")
+    listens, ready, exposes = server.stop(signal.SIGTERM)[1].splitlines()
+    assert listens.startswith(f"crux: listening on tcp/0.0.0.0:{port}; ")
+    assert ready.startswith("crux: ready; serving ")
     assert exposes.startswith(f"crux: tcp/0.0.0.0:{port}: whoever reaches it can ask")
 
 

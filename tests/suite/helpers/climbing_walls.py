@@ -33,7 +33,10 @@ def rock_of(seed=0, lean=0.8, **numbers):
 def tiny_source(**changes):
     """A wall of 20 points and a few bodies."""
     rock, pose = rock_of(**TINY)
-    grids = {"places": PlaceGrid(spacing=0.28), "bodies": BodyGrid(margin=0.45)}
+    grids = {
+        "places": PlaceGrid(spacing=0.28),
+        "bodies": BodyGrid(margin=0.4, stand_offs=(0.35, 0.5)),
+    }
     made = WallSource(rock=rock, rock_pose=pose, robot=robosimian(), **grids, together=6)
     return replace(made, **changes)
 

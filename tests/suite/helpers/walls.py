@@ -7,9 +7,9 @@ import numpy as np
 import scipy
 
 from hand_models.base import Pose, wrench_transport
+from planner import search
 from planner.prepare import prepare_stance
 from planner.programs import WRENCH_UNIT
-from planner import search
 from planner.reach import ReachTable
 from planner.robots import robosimian
 from planner.screening import HandParts, ScreeningTable, WorldHands

@@ -1,0 +1,12 @@
+from .detours import detours as detours
+from .finding import ClimbProgress as ClimbProgress, find_climb as find_climb
+from .found_climb import FoundClimb as FoundClimb
+from .move_checks import MoveChecks as MoveChecks
+from .outcome import (
+    ClimbStatus as ClimbStatus,
+    DecidingStage as DecidingStage,
+    Raise as Raise,
+    RefusedMoves as RefusedMoves,
+)
+from .raising import raises as raises
+from .routing import ClimbStep as ClimbStep, RouteMaker as RouteMaker

@@ -1,0 +1,69 @@
+"""The answer of a search for a climb that can be executed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from planner.climbs.outcome import ClimbStatus, DecidingStage, Raise, RefusedMoves
+from planner.route import Climb, Route, RouteResult
+from planner.search import Found, Wall
+
+__all__ = ["FoundClimb"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FoundClimb:
+    """The best climb that was planned whole, and how much better another could be.
+
+    Attributes
+    ----------
+    status : {'found', 'not_proven', 'none', 'blocked', 'unknown'}
+    wall : Wall
+    found : Found
+        Answer of the search whose states the climb has; of the last search without a climb.
+    bound : float
+        No climb of the wall has a larger least load factor, by its linear programs.
+    least : float or None
+        Least load factor of the climb's planned stages; None without a climb, or if a stage has
+        none.
+    route : Route or None
+    climb : Climb or None
+        Verified knots from end to end.
+    result : RouteResult or None
+        Plans of all stages.
+    deciding : DecidingStage or None
+    raises : tuple of Raise
+        Changes that raise the load factor of the deciding stage, the best first.
+    refused : tuple of RefusedMoves
+        Moves of found states that have no plan, by kind.
+    seconds : dict of str to float
+        Duration of each phase [s].
+    """
+
+    status: ClimbStatus
+    wall: Wall
+    found: Found
+    bound: float
+    least: float | None = None
+    route: Route | None = None
+    climb: Climb | None = None
+    result: RouteResult | None = None
+    deciding: DecidingStage | None = None
+    raises: tuple[Raise, ...] = ()
+    refused: tuple[RefusedMoves, ...] = ()
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def gap(self) -> float | None:
+        """Part by which another climb's least load factor may be larger; None without a climb."""
+        return self.bound / self.least - 1.0 if self.least else None
+
+    @property
+    def about(self) -> str:
+        """What the bound is about, in a sentence."""
+        wall = self.wall
+        return (
+            f"the bound is about {len(wall.places)} placements and {len(wall.bodies)} poses of the "
+            "body, hands with fixed wrists and joints as the reach table has them (what inverse "
+            "kinematics did not find is left out), without limits of joint torques"
+        )

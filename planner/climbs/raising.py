@@ -1,0 +1,87 @@
+"""What would raise the load factor of one stage: stronger rock, less mass, other placements."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from msgspec import structs
+
+from hand_models.base import InvalidInputError
+from planner.climbs.outcome import Raise
+from planner.question import Question
+from planner.screening import StanceIndices, solve_stance
+from planner.search import State, Wall
+from planner.solving import plan
+
+__all__ = ["raises"]
+
+
+def raises(
+    wall: Wall, state: State, stage: Question, factor: float, part: float = 0.1
+) -> tuple[Raise, ...]:
+    """Return changes of a stage that raise its load factor, the best first.
+
+    Parameters
+    ----------
+    wall : Wall
+    state : State
+        Of the stage.
+    stage : Question
+    factor : float
+        Its load factor.
+    part : float
+        By which the rock under a hand is to be stronger, or the mass less.
+    """
+    found = list[Raise]()
+    for i, hand in enumerate(stage.stance.hands):
+        hands = list(stage.stance.hands)
+        hands[i] = replace(hand, surface=hand.surface.times(1.0 + part))
+        stronger = replace(stage, stance=replace(stage.stance, hands=tuple(hands)))
+        words = f"rock under {hand.limb} {100.0 * part:.0f} % stronger"
+        found += _planned("strength", hand.limb, words, stronger)
+    mass = stage.stance.robot.mass if stage.load.mass is None else stage.load.mass
+    load = structs.replace(stage.load, mass=(1.0 - part) * mass)
+    words = f"{part * mass:.1f} kg less mass"
+    found += _planned("mass", None, words, replace(stage, load=load))
+    found += _elsewhere(wall, state)
+    better = [each for each in found if each.load_factor > factor * (1.0 + 1e-6)]
+    return tuple(sorted(better, key=lambda each: -each.load_factor))
+
+
+def _planned(kind: str, limb: str | None, words: str, question: Question) -> list[Raise]:
+    try:
+        factor = plan(question).load_factor
+    except InvalidInputError:
+        # a hand may close otherwise on stronger rock, and not at all
+        return []
+    return [] if factor is None else [Raise(kind=kind, limb=limb, change=words, load_factor=factor)]
+
+
+def _elsewhere(wall: Wall, state: State, most: int = 8) -> list[Raise]:
+    """Return the best other placement of each hand, by linear programs of those that look best."""
+    found = list[Raise]()
+    members = np.array(state.members)
+    for limb, present in enumerate(state.members):
+        others = np.delete(members, limb)
+        fits = wall.reach.reached[:, state.body, limb] & wall.apart[:, others[others >= 0]].all(1)
+        fits[members[members >= 0]] = False
+        choices = np.flatnonzero(fits)
+        if present < 0 or not len(choices):
+            continue
+        stances = np.repeat(members[None], len(choices), axis=0)
+        stances[:, limb] = choices
+        asked = StanceIndices(np.full(len(choices), state.body), stances)
+        order = np.argsort(-wall.screening.bounds(asked), kind="stable")[:most]
+        wrenches = wall.screening.needed(asked)
+        factors = [
+            solve_stance(wall.screening.hands, row[row >= 0], wrenches[i]).factor
+            for i, row in zip(order, stances[order], strict=True)
+        ]
+        if not np.isnan(factors).all():
+            k = int(np.nanargmax(factors))
+            name, place = wall.robot.limbs[limb], int(choices[order[k]])
+            x, y, z = wall.places[place].pose.position
+            words = f"{name} at placement {place} instead, at ({x:.2f}, {y:.2f}, {z:.2f}) m"
+            found.append(Raise(kind="place", limb=name, change=words, load_factor=factors[k]))
+    return found

@@ -1,0 +1,132 @@
+"""States of a wall as a route: a move for each limb that is lifted and placed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from hand_models.base import Array, Pose
+from planner.question import HandOnHold, Limits, Objective, Stance
+from planner.route import KnotPhase, Move, Route
+from planner.search import State, Wall
+
+__all__ = ["Arc", "ClimbStep", "RouteMaker"]
+
+Arc = tuple[State, State]
+"""Two states, one after the other; or those with all hands on the rock about a whole move."""
+
+
+class ClimbStep(NamedTuple):
+    """The states of one move.
+
+    Attributes
+    ----------
+    shifts : tuple of State
+        With all hands on the rock, from before the body shifts to where the limb lifts; one state
+        if the body does not shift.
+    lift, place : State or None
+        With the limb in the air, and on its new placement; None for a last shift without a move.
+    """
+
+    shifts: tuple[State, ...]
+    lift: State | None
+    place: State | None
+
+    @classmethod
+    def each(cls, states: Sequence[State]) -> list[Self]:
+        """Return the moves of a climb's states."""
+        found = list[Self]()
+        shifts, lift = [states[0]], None
+        for state in states[1:]:
+            if min(state.members) < 0:
+                lift = state
+            elif lift is None:
+                shifts.append(state)
+            else:
+                found.append(cls(tuple(shifts), lift, state))
+                shifts, lift = [state], None
+        if len(shifts) > 1:
+            found.append(cls(tuple(shifts), None, None))
+        return found
+
+    @property
+    def limb(self) -> int:
+        """Index of the limb that moves."""
+        assert self.lift is not None
+        return self.lift.members.index(-1)
+
+    def refused(self, phase: KnotPhase) -> frozenset[Arc]:
+        """Return what is to be left out of further climbs if a part of this move has no plan."""
+        before = self.shifts[-1]
+        if phase == "start":
+            return frozenset({(self.shifts[0], self.shifts[0])})
+        if phase == "shift" or self.lift is None or self.place is None:
+            return frozenset(zip(self.shifts, self.shifts[1:], strict=False))
+        if phase in ("unload", "open"):
+            return frozenset({(before, self.lift)})
+        if phase in ("swing", "close"):
+            return frozenset({(before, self.place)})
+        return frozenset({(self.lift, self.place)})
+
+
+class RouteMaker:
+    """Makes routes of a wall's states; equal moves are the same objects.
+
+    Parameters
+    ----------
+    wall : Wall
+    name : str
+        Of the routes.
+    limits : Limits
+    objective : str
+        Of every stage.
+    """
+
+    def __init__(self, wall: Wall, name: str, limits: Limits, objective: Objective) -> None:
+        self.wall, self._name, self.limits, self._objective = wall, name, limits, objective
+        self._moves = dict[tuple[int, int, int | None], Move]()
+        self._places = {_key(each.pose): i for i, each in enumerate(wall.places)}
+        self._bodies = {_key(each): i for i, each in enumerate(wall.bodies)}
+
+    def route(self, steps: Sequence[ClimbStep]) -> Route:
+        """Return the route of moves, from the first state on."""
+        wall, first = self.wall, steps[0].shifts[0]
+        hands = [self._hand(limb, p) for limb, p in enumerate(first.members)]
+        last = steps[-1]
+        return Route(
+            name=self._name,
+            start=Stance(tuple(hands), wall.bodies[first.body], robot=wall.robot, joints="solve"),
+            moves=tuple(self._move(step) for step in steps if step.lift is not None),
+            end=None if last.lift is not None else wall.bodies[last.shifts[-1].body],
+            limits=self.limits,
+            objective=self._objective,
+            explain=False,
+        )
+
+    def branches(self, limb: str, body: Pose, hand: Pose) -> Array:
+        """Return the joint angles of the reach table, shape (k, n) [rad]."""
+        n = len(self.wall.robot.chains[limb].joints)
+        p, b = self._places.get(_key(hand)), self._bodies.get(_key(body))
+        if p is None or b is None:
+            return np.zeros((0, n))
+        return self.wall.reach.branches(p, b, self.wall.robot.limbs.index(limb))[:, :n]
+
+    def _hand(self, limb: int, place: int) -> HandOnHold:
+        return replace(self.wall.places[place], limb=self.wall.robot.limbs[limb])
+
+    def _move(self, step: ClimbStep) -> Move:
+        assert step.place is not None
+        body = step.place.body if len(step.shifts) > 1 else None
+        key = step.limb, step.place.members[step.limb], body
+        if key not in self._moves:
+            hand = self._hand(step.limb, step.place.members[step.limb])
+            self._moves[key] = Move(hand, None if body is None else self.wall.bodies[body])
+        return self._moves[key]
+
+
+def _key(pose: Pose) -> bytes:
+    """Return the digits of a pose."""
+    return pose.position.tobytes() + pose.rotation.tobytes()

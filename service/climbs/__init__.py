@@ -1,0 +1,5 @@
+"""Search for climbs on a rock, and write what was found."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,137 @@
+"""Make a request for a climb of what is given as text: ends, grids, and how good it has to be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+
+from hand_models.base import InvalidInputError
+from planner import BodyGrid, PlaceGrid
+from service import requests
+from service.climbs.rocks import rock_message
+
+__all__ = ["Sought", "climb_end", "demo_request"]
+
+
+class Sought(NamedTuple):
+    """Options of a climb that is searched for: its ends, the grids, and how good it has to be."""
+
+    start: str
+    goal: str
+    radius: float
+    best_within: str
+    at_least: float | None
+    time: float | None
+    surface: str
+    spacing: float | None
+    body_spacing: float | None
+    lean: float
+
+    def request(
+        self, rock: Path, read: Callable[[str], requests.PlanRequest]
+    ) -> requests.ClimbRequest:
+        """Return the request for a climb on a rock; ``read`` reads a stance of a name."""
+        grids = {"places": self.spacing, "bodies": self.body_spacing}
+        given = {grid: {"spacing": value} for grid, value in grids.items() if value is not None}
+        return requests.ClimbRequest(
+            v=1,
+            name=rock.stem,
+            rock=rock_message(rock, self.lean),
+            surface=self.surface,
+            places=msgspec.convert(given.get("places", {}), PlaceGrid),
+            bodies=msgspec.convert(given.get("bodies", {}), BodyGrid),
+            best_within=_part(self.best_within, "--best-within"),
+            at_least=self.at_least,
+            time=self.time,
+            start=climb_end(self.start, "--from", self.radius, read),
+            goal=climb_end(self.goal, "--to", self.radius, read),
+        )
+
+
+def demo_request() -> requests.ClimbRequest:
+    """Return the request for a climb on the bundled small wall."""
+    return requests.ClimbRequest(
+        v=1,
+        name="small-wall",
+        rock="small-wall",
+        start=requests.ClimbEnd(height=0.7),
+        goal=requests.ClimbEnd(height=1.1),
+        best_within=0.2,
+        time=120.0,
+    )
+
+
+def climb_end(
+    text: str,
+    field: str,
+    radius: float,
+    read: Callable[[str], requests.PlanRequest],
+) -> requests.ClimbEnd:
+    """Return an end of a climb from ``x,y,z``, ``height:Z``, or a stance.
+
+    Parameters
+    ----------
+    text : str
+    field : str
+        Option that has the text.
+    radius : float
+        Distance of the body from a point [m].
+    read : callable
+        Reads a stance of which the text is the name.
+
+    Raises
+    ------
+    InvalidInputError
+        If the text is none of the three.
+    """
+    head, colon, rest = text.partition(":")
+    try:
+        if head == "height" and colon:
+            return requests.ClimbEnd(height=_number(rest))
+        if "," in text:
+            numbers = [_number(each) for each in text.split(",")]
+            if len(numbers) != 3:
+                raise InvalidInputError(f"must be three numbers x,y,z, got {text!r}", field=field)
+            x, y, z = numbers
+            return requests.ClimbEnd(near=(x, y, z), radius=radius)
+    except (ValueError, msgspec.ValidationError):
+        raise InvalidInputError(
+            f"must be x,y,z or height:Z in finite metres, or a stance, got {text!r}", field=field
+        ) from None
+    stance = read(text).stance
+    hands = []
+    for i, hand in enumerate(stance.hands):
+        if hand.pose is None:
+            raise InvalidInputError(
+                f"{text}: a stance of a climb needs the pose of each hand",
+                field=f"{field}: hands[{i}].pose",
+            )
+        hands.append(requests.EndHand(limb=hand.limb, pose=hand.pose, grasp=hand.grasp))
+    return requests.ClimbEnd(body=stance.body, hands=hands)
+
+
+def _part(text: str, field: str) -> float:
+    """Return a part of a whole from ``5%`` or ``0.05``.
+
+    Raises
+    ------
+    InvalidInputError
+        If the text is no such part, from 0 to 10.
+    """
+    try:
+        found = _number(text.removesuffix("%")) * (0.01 if text.endswith("%") else 1.0)
+    except ValueError:
+        found = -1.0
+    if not 0.0 <= found <= 10.0:
+        raise InvalidInputError(f"must be a part such as 5% or 0.05, got {text!r}", field=field)
+    return found
+
+
+def _number(text: str) -> float:
+    found = float(text)
+    if not abs(found) <= 1e6:
+        raise ValueError(text)
+    return found

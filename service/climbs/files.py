@@ -1,0 +1,113 @@
+"""Write the files of a planned route, and those of a search for a climb."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+
+import planner
+from hand_models.base import Array, whole_file
+from hand_models.scans import write_rock
+from service import answering, bulk, replies, requests
+
+if TYPE_CHECKING:
+    from service.answering import SoughtClimb
+
+__all__ = ["write_route", "write_search", "write_stance"]
+
+StageRequest = Callable[
+    [planner.RouteStage, Mapping[str, Array] | None, Path], requests.PlanRequest
+]
+"""Returns the plan request of a stage at joint angles, for a file in a folder."""
+
+
+def write_route(
+    result: planner.RouteResult,
+    climb: planner.Climb | None,
+    folder: Path,
+    request_of: StageRequest,
+) -> tuple[dict[str, Path], str | None]:
+    """Write report, pictures, trajectory and stances of a route.
+
+    Return the files by name, and the digest of the trajectory; None without one.
+
+    Parameters
+    ----------
+    result : RouteResult
+    climb : Climb or None
+    folder : Path
+        Created if missing.
+    request_of : callable
+        Returns the request of a stage.
+    """
+    knots = [] if climb is None else [replies.KnotReply.of(knot) for knot in climb.knots]
+    trajectory, digest = bulk.write_trajectory(knots, folder), None
+    if climb is not None and knots:
+        digest = bulk.trajectory_digest(folder, climb.rates)
+    files = planner.write_report(result, folder, climb, digest) | trajectory
+    files["stances"] = _write_stages(result, folder / "stages", request_of)
+    return files, digest
+
+
+def _write_stages(result: planner.RouteResult, folder: Path, request_of: StageRequest) -> Path:
+    """Write each stage as a stance of its own; return the folder."""
+    folder.mkdir(exist_ok=True)
+    for old in folder.glob("*.json"):
+        if old.name.partition("-")[0].isdecimal():
+            old.unlink()
+    for stage, answer in zip(result.stages, result.plans, strict=True):
+        name = "-".join(filter(None, (f"{stage.index:02d}", stage.phase, stage.limb)))
+        write_stance(request_of(stage, answer.joints, folder), folder / f"{name}.json")
+    return folder
+
+
+def write_stance(request: requests.PlanRequest | requests.RouteRequest, file: Path) -> None:
+    """Write a request as a file of JSON."""
+    with whole_file(file) as part:
+        part.write_bytes(msgspec.json.format(msgspec.json.encode(request)))
+
+
+def write_search(
+    request: requests.ClimbRequest, sought: SoughtClimb, folder: Path
+) -> dict[str, Path]:
+    """Write wall, certificate, picture and route of a search; return the files by name.
+
+    The route names the file of the rock, which is written beside it.
+
+    Parameters
+    ----------
+    request : ClimbRequest
+    sought : SoughtClimb
+    folder : Path
+        Existing; files of these names are replaced, and removed where there is none to write.
+    """
+    found, wall = sought.found, sought.made.wall
+    files = {
+        "wall": folder / "wall.npz",
+        "picture of the wall": folder / "wall.png",
+        "rock": folder / "rock.ply",
+        "certificate": folder / "certificate.npz",
+        "route": folder / "route.json",
+    }
+    planner.write_wall(wall, files["wall"], request.name)
+    planner.plot_wall(found, sought.rock, sought.rock_pose, files["picture of the wall"])
+    if found.found.proof is None:
+        files.pop("certificate").unlink(missing_ok=True)
+    else:
+        planner.climb_certificate(wall, sought.start, sought.goal, found.found).write(
+            files["certificate"]
+        )
+    if found.route is None:
+        for name in ("rock", "route"):
+            files.pop(name).unlink(missing_ok=True)
+        return files
+    write_rock(sought.rock.triangles, files["rock"])
+    given = answering.route_request(request, found.route)
+    pose = answering.pose_message(sought.rock_pose)
+    rocks = {"rock": requests.Mesh(file=files["rock"].name, pose=pose)}
+    stance = msgspec.structs.replace(given.stance, rocks=rocks)
+    write_stance(msgspec.structs.replace(given, stance=stance), files["route"])
+    return files

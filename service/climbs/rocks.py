@@ -1,0 +1,32 @@
+"""Read the rock of a climb as a request has it: a mesh in W, or the name of a generated wall."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from hand_models.rock import read_mesh, wall_names
+from service import requests
+
+__all__ = ["rock_message"]
+
+
+def rock_message(rock: Path, lean: float) -> requests.Mesh | str:
+    """Return the rock of a request.
+
+    Parameters
+    ----------
+    rock : Path
+        A mesh file in metres, its frame with x up the rock and z into it; or, where there is no
+        such file, the name of a generated wall.
+    lean : float
+        Angle of a mesh's x from the vertical, away from the climber [rad].
+    """
+    if not rock.exists() and str(rock).partition(":")[0] in wall_names():
+        return str(rock)
+    vertices, faces = read_mesh(rock)
+    sine, cosine = math.sin(lean), math.cos(lean)
+    pose = requests.Pose(
+        position=(0.0, 0.0, 0.0), x_axis=(sine, 0.0, cosine), z_axis=(cosine, 0.0, -sine)
+    )
+    return requests.Mesh(vertices=vertices.tolist(), faces=faces.tolist(), pose=pose)

@@ -1,0 +1,78 @@
+"""Say what came of the search for a climb: to a person, and as an exit status."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from planner import FoundClimb, constraint_words
+from service.tables import ExitStatus
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["exit_status", "print_verdict"]
+
+
+def exit_status(found: FoundClimb) -> ExitStatus:
+    """Return the exit status: 0 with a climb, 3 if there is none, 1 if none was found in time."""
+    if found.status in ("found", "not_proven"):
+        return ExitStatus.DONE
+    return ExitStatus.FAILED if found.status == "unknown" else ExitStatus.OVERLOADED
+
+
+def print_verdict(
+    found: FoundClimb, at_least: float | None, files: Mapping[str, Path], out: Console
+) -> None:
+    """Print the verdict of a search, and the names of its files.
+
+    Parameters
+    ----------
+    found : FoundClimb
+    at_least : float or None
+        Load factor that was asked for.
+    files : mapping of str to Path
+    out : Console
+    """
+    for sentence in _sentences(found, at_least):
+        out.print(sentence, markup=False, highlight=False)
+    for name, path in files.items():
+        out.print(f"{name}: {path}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _sentences(found: FoundClimb, at_least: float | None) -> Iterator[str]:
+    asked = "" if at_least is None else f" with a load factor of {at_least:g}"
+    yield {
+        "found": "FOUND     a climb, planned from end to end",
+        "not_proven": "FOUND     a climb, planned from end to end; another may be better",
+        "none": f"NONE      it is proven that no climb{asked} exists",
+        "blocked": f"BLOCKED   hands could hold a climb{asked}, but no moves of one have a plan",
+        "unknown": f"UNKNOWN   no climb{asked} was found in time; there may be one",
+    }[found.status]
+    if found.least is not None and found.climb is not None and found.gap is not None:
+        yield (
+            f"least load factor {found.least:.3f}, of any other climb at most {found.bound:.3f} "
+            f"(gap {100.0 * found.gap:.1f} %); {found.found.least:.3f} by statics alone"
+        )
+        knots = found.climb.knots
+        moves = len(found.climb.route.moves)
+        yield f"{moves} moves, {len(knots)} knots, {knots[-1].time:.0f} s long"
+    elif abs(found.bound) < float("inf"):
+        yield f"no climb has a least load factor above {found.bound:.3f}"
+    deciding = found.deciding
+    if deciding is not None:
+        what = " ".join(filter(None, (deciding.phase, deciding.limb)))
+        where = ", ".join(f"{limb} at {place}" for limb, place in deciding.placements.items())
+        limit = (
+            ""
+            if deciding.limiting is None
+            else (f"; {deciding.limiting.limb}: {constraint_words(deciding.limiting)} is used most")
+        )
+        yield f"stage {deciding.stage} decides (move {deciding.move}, {what}; {where}){limit}"
+    for each in found.raises[:3]:
+        yield f"  there {each.load_factor:.3f} with {each.change}"
+    for kind in found.refused[:3]:
+        times = f"{kind.count} moves" if kind.count > 1 else "a move"
+        yield f"{times} had no plan ({kind.phase} of {kind.limb}): {kind.reason}"
+    yield found.about
