@@ -1,7 +1,7 @@
-from .detours import detours as detours
 from .finding import ClimbProgress as ClimbProgress, find_climb as find_climb
 from .found_climb import FoundClimb as FoundClimb
 from .move_checks import MoveChecks as MoveChecks
+from .other_bodies import detours as detours
 from .outcome import (
     ClimbStatus as ClimbStatus,
     DecidingStage as DecidingStage,

@@ -13,9 +13,9 @@ import numpy as np
 
 from hand_models.base import InvalidInputError
 from planner import deadline
-from planner.climbs.detours import detours
 from planner.climbs.found_climb import FoundClimb
 from planner.climbs.move_checks import MoveChecks
+from planner.climbs.other_bodies import detours
 from planner.climbs.outcome import ClimbStatus, DecidingStage, Raise, RefusedMoves
 from planner.climbs.raising import raises
 from planner.climbs.routing import Arc, ClimbStep, RouteMaker
@@ -37,7 +37,7 @@ __all__ = ["ClimbProgress", "find_climb"]
 
 
 class ClimbProgress(NamedTuple):
-    """How far the search for a climb is.
+    """Progress of the search for a climb.
 
     Attributes
     ----------
@@ -153,7 +153,7 @@ class _Finder:
 
     def find(self, start: Ends, goal: Ends, within: float, at_least: float | None) -> FoundClimb:
         """Search and plan until the climb is good enough, nothing is left, or the time is over."""
-        found, share, ended = None, 0.5, False
+        found, share, ended = None, 0.7, False
         while not ended:
             found = self._search(start, goal, within, at_least, share)
             if not found.states:
@@ -254,11 +254,11 @@ class _Finder:
         )
         wall, best = self._maker.wall, self._best
         if best is None:
-            proven = found.finished and self._bound < (at_least or np.inf)
-            proven = proven and not (self._blocked and self._bound > -np.inf)
-            nothing: ClimbStatus = "blocked" if found.finished and not found.states else "unknown"
+            ended = found.finished and not found.states
+            proven = self._bound <= (-np.inf if at_least is None else at_least)
+            nothing: ClimbStatus = ("none" if proven else "blocked") if ended else "unknown"
             return FoundClimb(
-                status="none" if proven and not found.states else nothing,
+                status=nothing,
                 wall=wall,
                 found=found,
                 bound=self._bound,
@@ -267,7 +267,7 @@ class _Finder:
             )
         status: ClimbStatus = "found" if self._good(within, at_least) else "not_proven"
         if at_least is not None and best.least < at_least:
-            status = "none" if self._bound < at_least else "unknown"
+            status = "none" if self._bound <= at_least else "unknown"
         begun = time.perf_counter()
         self._report("changes")
         deciding, state = _deciding(best, wall)

@@ -60,7 +60,7 @@ class FoundClimb:
 
     @property
     def about(self) -> str:
-        """What the bound is about, in a sentence."""
+        """Sentence that says what the bound is about."""
         wall = self.wall
         return (
             f"the bound is about {len(wall.places)} placements and {len(wall.bodies)} poses of the "

@@ -1,4 +1,4 @@
-"""What a move needs beside statics, quickly: others hold the robot while a hand lets go or closes.
+"""Check quickly that others hold the robot while a hand lets go or closes.
 
 A lift's program has the free limb at rest. While that hand is unloaded it is still at its old
 placement, and it is loaded at its new one: the others must hold the limb's weight there, and what

@@ -1,4 +1,4 @@
-"""What would raise the load factor of one stage: stronger rock, less mass, other placements."""
+"""Changes that raise the load factor of one stage: stronger rock, less mass, other placements."""
 
 from __future__ import annotations
 

@@ -171,7 +171,7 @@ class SlipDiagnosis:
         reason = None if seen else self._unseen(own, shown, known, kind)
         return SlipFindings(seen, tiles, suspects, reason)
 
-    def _unseen(self, own: Array, shown: _Shown, known: Array, kind: str) -> str:
+    def _unseen(self, own: Array, shown: _Shown, known: Indices, kind: str) -> str:
         """Say why no slip is seen: what is off most, and how many slips would not show."""
         least = _numbers()["seen"]
         off = (own - shown.rests) / shown.rest_errors

@@ -171,7 +171,7 @@ def plot_wall(found: FoundClimb, rock: Mesh, rock_pose: Pose, path: Path) -> Non
     axes, lower = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
     vertices = rock.triangles.vertices
     axes.hexbin(
-        *vertices[:, [1, 0]].T, C=-vertices[:, 2], gridsize=150, cmap="gray", alpha=0.6, zorder=0
+        *vertices[:, [1, 0]].T, C=-vertices[:, 2], gridsize=60, cmap="gray", alpha=0.6, zorder=0
     )
     up = np.eye(6)[2:3]
     lifts = wall.screening.hands.supports(up)[:, 0] * WRENCH_UNIT[2]
@@ -180,7 +180,7 @@ def plot_wall(found: FoundClimb, rock: Mesh, rock_pose: Pose, path: Path) -> Non
         *places.T, c=lifts, cmap="viridis", s=26, edgecolors="white", linewidths=0.4
     )
     figure.colorbar(shown, ax=axes, label="largest force upward of a hand [N]", shrink=0.8)
-    axes.plot(*flat(wall.bodies).T, ".", color="0.2", markersize=2, label="poses of the body")
+    axes.plot(*flat(wall.bodies).T, "k+", markersize=5, label="poses of the body")
     climb, deciding = found.climb, found.deciding
     if climb is not None:
         for i, limb in enumerate(wall.robot.limbs):

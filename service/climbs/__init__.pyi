@@ -6,4 +6,4 @@ from .files import (
 )
 from .listing import print_routes as print_routes
 from .seeking import seek as seek
-from .verdict import exit_status as exit_status, print_verdict as print_verdict
+from .verdict import climb_status as climb_status, print_verdict as print_verdict

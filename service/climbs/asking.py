@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -28,21 +28,26 @@ class Sought(NamedTuple):
     surface: str
     spacing: float | None
     body_spacing: float | None
+    stand_off: tuple[float, ...]
     lean: float
 
     def request(
         self, rock: Path, read: Callable[[str], requests.PlanRequest]
     ) -> requests.ClimbRequest:
         """Return the request for a climb on a rock; ``read`` reads a stance of a name."""
-        grids = {"places": self.spacing, "bodies": self.body_spacing}
-        given = {grid: {"spacing": value} for grid, value in grids.items() if value is not None}
+        places = {} if self.spacing is None else {"spacing": self.spacing}
+        bodies: dict[str, Any] = {}
+        if self.body_spacing is not None:
+            bodies["spacing"] = self.body_spacing
+        if self.stand_off:
+            bodies["stand_offs"] = self.stand_off
         return requests.ClimbRequest(
             v=1,
             name=rock.stem,
             rock=rock_message(rock, self.lean),
             surface=self.surface,
-            places=msgspec.convert(given.get("places", {}), PlaceGrid),
-            bodies=msgspec.convert(given.get("bodies", {}), BodyGrid),
+            places=PlaceGrid(**places),
+            bodies=BodyGrid(**bodies),
             best_within=_part(self.best_within, "--best-within"),
             at_least=self.at_least,
             time=self.time,
@@ -57,10 +62,12 @@ def demo_request() -> requests.ClimbRequest:
         v=1,
         name="small-wall",
         rock="small-wall",
-        start=requests.ClimbEnd(height=0.7),
-        goal=requests.ClimbEnd(height=1.1),
-        best_within=0.2,
-        time=120.0,
+        start=requests.ClimbEnd(height=0.75),
+        goal=requests.ClimbEnd(height=1.0),
+        places=PlaceGrid(spacing=0.18),
+        bodies=BodyGrid(stand_offs=(0.6, 0.7)),
+        best_within=0.3,
+        time=240.0,
     )
 
 

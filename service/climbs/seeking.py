@@ -17,7 +17,7 @@ def seek(
     robots: answering.Robots,
     on: str,
     workers: int | None,
-    kept: Path | None = None,
+    folder: Path,
 ) -> answering.SoughtClimb:
     """Search for the climb of a request; show phase, best load factor, bound and gap.
 
@@ -28,11 +28,13 @@ def seek(
     on : str
         Where the wall is made, as of `service.processes.make_wall`.
     workers : int or None
-    kept : Path, optional
-        File of finished chunks of the wall.
+    folder : Path
+        Keeps the finished chunks of walls, in a file for each rock and grid: a search that was
+        broken off, or the next one on the same wall, goes on with them.
     """
 
     def make(source: WallSource, report: WallProgress) -> MadeWall:
+        kept = folder / f"wall-{source.digest[:12]}.chunks"
         return make_wall(source, on, workers=workers, kept=kept, report=report)
 
     with tables.progress(f"a climb on {request.name}") as bar:

@@ -12,10 +12,10 @@ from service.tables import ExitStatus
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["exit_status", "print_verdict"]
+__all__ = ["climb_status", "print_verdict"]
 
 
-def exit_status(found: FoundClimb) -> ExitStatus:
+def climb_status(found: FoundClimb) -> ExitStatus:
     """Return the exit status: 0 with a climb, 3 if there is none, 1 if none was found in time."""
     if found.status in ("found", "not_proven"):
         return ExitStatus.DONE

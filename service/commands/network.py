@@ -298,10 +298,10 @@ def demo_command(picture: Path, folder: Path | None, own: options.Own, as_json: 
     """
     if folder is not None:
         from service import climbs
-        from service.commands.routes import find_climb
+        from service.commands.routes import search_climb
 
         asked = own.asked(climbs.demo_request())
-        return find_climb(asked, folder, options.WorkersOption(None, None), own, as_json)
+        return search_climb(asked, folder, options.WorkersOption(None, None), own, as_json)
     request = options.with_extras(own.asked(stances.read_request("wall-300-joints")))
     serving.start_zenoh_log()
     config = serving.zenoh_config(settings=["listen/endpoints:[]"], multicast=False)

@@ -26,7 +26,7 @@ from service.commands.batch import answer_rest, complain, exit_status, new_run
 if TYPE_CHECKING:
     from hand_models.base import Array
 
-__all__ = ["climb_command", "find_climb", "route_command"]
+__all__ = ["climb_command", "route_command", "search_climb"]
 
 LISTED_ENDINGS: Final = ".jsonl or .csv or .parquet"
 
@@ -127,6 +127,9 @@ sought_options = options.asked_for(
     click.option("--surface", default="rock", show_default=True, help="A preset's name."),
     _above("--spacing", "Of the points at which hands are tried [m].", most=10.0),
     _above("--body-spacing", "Of the places of the body [m].", most=10.0),
+    _above(
+        "--stand-off", "Of the body from the rock [m]; may be repeated.", most=10.0, multiple=True
+    ),
     click.option(
         "--lean",
         type=options.FiniteRange(-1.57, 1.57),
@@ -160,12 +163,12 @@ def climb_command(
     Exit status: 0 with a climb, 3 if it is proven that there is none or no moves have a plan, 1 if
     none was found in time.
     """
-    return find_climb(
+    return search_climb(
         own.asked(sought.request(rock, stances.read_request)), folder, parallel, own, as_json
     )
 
 
-def find_climb(
+def search_climb(
     request: requests.ClimbRequest,
     folder: Path,
     parallel: options.WorkersOption,
@@ -178,7 +181,7 @@ def find_climb(
     tables.write_alone(folder / "climb", folder)
     # a wall takes as long as some thousand plans
     on, workers = parallel.place(1000)
-    found = climbs.seek(request, own.robots, on, workers)
+    found = climbs.seek(request, own.robots, on, workers, folder)
     with tables.filling_folder():
         files = climbs.write_search(request, found, folder)
         if found.found.result is not None:
@@ -190,7 +193,7 @@ def find_climb(
         tables.say(reply | {"files": {name: str(path) for name, path in files.items()}})
     else:
         climbs.print_verdict(found.found, request.at_least, files, tables.console())
-    return climbs.exit_status(found.found)
+    return climbs.climb_status(found.found)
 
 
 class _Asked(NamedTuple):

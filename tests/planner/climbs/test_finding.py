@@ -1,0 +1,178 @@
+"""Climbs that are found and planned whole, on small walls of knobs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hand_models.base import InvalidInputError, Pose
+from planner import Load, Question, Stance, evaluate, find_climb, plan, plan_climb
+from planner.climbs import ClimbStep, MoveChecks, RouteMaker, detours
+from planner.question import Limits
+from planner.search import State
+from tests.suite.helpers.climbs import climbed
+from tests.suite.helpers.knob_walls import best_climb, ends, factor, knob_wall, neighbours
+
+START, GOAL = (0, 2, 4, 6), (0, 2, 4, 7)
+
+
+def maker():
+    return RouteMaker(knob_wall(), "a climb", Limits(), "max_margin")
+
+
+def states():
+    """Two moves with a shift before the second, and one at the end."""
+    return [
+        State(1, (0, 2, 4, 6)),
+        State(1, (0, 2, 4, -1)),
+        State(1, (0, 2, 4, 7)),
+        State(4, (0, 2, 4, 7)),
+        State(4, (-1, 2, 4, 7)),
+        State(4, (1, 2, 4, 7)),
+        State(7, (1, 2, 4, 7)),
+    ]
+
+
+def test_states_make_moves_with_shifts_before_lifts_and_one_at_the_end():
+    wall, climb = knob_wall(), states()
+    first, second, last = ClimbStep.each(climb)
+    assert first == (tuple(climb[:1]), climb[1], climb[2])
+    assert second == (tuple(climb[2:4]), climb[4], climb[5])
+    assert last == (tuple(climb[5:]), None, None)
+    route = maker().route([first, second, last])
+    assert [move.hand.limb for move in route.moves] == ["front_left", "front_right"]
+    assert route.moves[0].body is None
+    assert route.moves[1].body is wall.bodies[4]
+    assert route.end is wall.bodies[7]
+    assert [hand.pose for hand in route.start.hands] == [wall.places[p].pose for p in climb[0][1]]
+
+
+def test_what_fails_is_left_out_by_the_states_about_it():
+    _, second, last = ClimbStep.each(states())
+    climb = states()
+    assert second.refused("shift") == {(climb[2], climb[3])}
+    assert second.refused("open") == {(climb[3], climb[4])}
+    assert second.refused("swing") == {(climb[3], climb[5])}
+    assert second.refused("load") == {(climb[4], climb[5])}
+    assert second.refused("start") == {(climb[2], climb[2])}
+    assert last.refused("shift") == {(climb[5], climb[6])}
+
+
+def test_stages_planned_at_the_tables_postures_have_the_load_factors_of_the_search():
+    wall = knob_wall()
+    limbs = wall.robot.limbs
+    for state in (State(1, START), State(1, (0, 2, 4, -1)), State(4, (1, 2, 4, 7))):
+        on = [(i, p) for i, p in enumerate(state.members) if p >= 0]
+        joints = {limbs[i]: wall.reach.branches(p, state.body, i)[0] for i, p in on}
+        hands = tuple(replace(wall.places[p], limb=limbs[i]) for i, p in on)
+        stance = Stance(hands, wall.bodies[state.body], robot=wall.robot)
+        com = tuple(wall.robot.com_at(joints))
+        asked = Question(stance, load=Load(com=com), want=frozenset({"load_factor"}))
+        assert plan(asked).load_factor == pytest.approx(factor(wall, state), rel=1e-6)
+
+
+def test_a_move_needs_the_others_to_hold_what_its_closed_hand_does():
+    wall = knob_wall()
+    whole, lift = State(1, START), State(1, (0, 2, 4, -1))
+    assert MoveChecks(wall).passes(whole, lift)
+    assert MoveChecks(wall).passes(lift, whole)
+    # within a small part of all limits the others do not hold it
+    assert not MoveChecks(wall, 0.2).passes(whole, lift)
+    # the body is shifted on all hands, which has no such check
+    assert MoveChecks(wall, 0.2).passes(whole, State(4, START))
+
+
+def test_detours_are_states_of_the_wall_one_after_the_other():
+    wall, climb = knob_wall(), states()
+    step = ClimbStep.each(climb)[1]
+    found = [*detours(wall, MoveChecks(wall), climb, step)]
+    assert found
+    least = []
+    for other in found:
+        k = next(k for k, state in enumerate(other) if -1 in state.members and k > 1)
+        assert other[k].body != climb[4].body
+        assert other[0] == climb[0]
+        assert other[-1] == climb[-1]
+        assert other[k + 1] in neighbours(wall, other[k])
+        assert other[k] in neighbours(wall, other[k - 1])
+        least.append(min(factor(wall, state) for state in other[k - 1 : k + 2]))
+    assert least == sorted(least, reverse=True)
+
+
+@pytest.mark.slow
+def test_a_climb_is_found_and_every_knot_of_it_is_verified():
+    wall = knob_wall()
+    told = []
+    found = find_climb(
+        wall, ends(wall, [1], START), ends(wall, [1], GOAL), within=1.0, progress=told.append
+    )
+    assert found.status == "found"
+    assert found.climb.failure is None
+    assert all(knot.verified for knot in found.climb.knots)
+    assert found.result.feasible
+    factors = [p.load_factor for p in found.result.plans]
+    assert found.least == min(factors) == factors[found.deciding.stage]
+    _, best = best_climb(wall, ends(wall, [1], START), ends(wall, [1], GOAL))
+    assert found.bound >= best * (1.0 - 1e-9)
+    assert found.gap == pytest.approx(found.bound / found.least - 1.0)
+    assert all(each.load_factor > found.least for each in found.raises)
+    assert {each.kind for each in found.raises} >= {"mass", "strength"}
+    assert {each.phase for each in told} >= {"search", "moves", "stages", "changes"}
+    # the route repeats the climb
+    again = plan_climb(found.route)
+    assert len(again.knots) == len(found.climb.knots)
+    for knot, other in zip(found.climb.knots, again.knots, strict=True):
+        assert knot.utilisation == pytest.approx(other.utilisation, abs=1e-6)
+
+
+def test_it_is_proven_that_no_climb_has_a_load_factor_that_hands_do_not_hold():
+    wall = knob_wall()
+    found = find_climb(wall, ends(wall, [1], START), ends(wall, [1], GOAL), at_least=3.0)
+    assert (found.status, found.climb, found.least) == ("none", None, None)
+    assert found.bound <= 3.0
+
+
+def test_without_time_nothing_is_said_of_a_climb():
+    wall = knob_wall()
+    found = find_climb(wall, ends(wall, [1], START), ends(wall, [1], GOAL), seconds=1e-6)
+    assert found.status == "unknown"
+    assert found.climb is None
+
+
+@pytest.mark.parametrize(
+    ("field", "changes"),
+    [
+        ("within", {"within": np.nan}),
+        ("within", {"within": -0.1}),
+        ("at_least", {"at_least": 0.0}),
+        ("seconds", {"seconds": 0.0}),
+        ("seconds", {"seconds": np.inf}),
+        ("goal", {"bodies": []}),
+    ],
+)
+def test_impossible_numbers_are_refused(field, changes):
+    wall = knob_wall()
+    goal = ends(wall, changes.pop("bodies", [1]), GOAL)
+    with pytest.raises(InvalidInputError) as caught:
+        find_climb(wall, ends(wall, [1], START), goal, **changes)
+    assert caught.value.field == field
+
+
+def test_a_climb_branches_off_another_and_ends_with_a_shift():
+    whole = climbed()
+    route = whole.climb.route
+    last = route.moves[-1].body
+    end = Pose(last.position - 0.01 * last.rotation[:, 0], last.rotation)
+    other = replace(route, moves=(route.moves[0],), end=end)
+    climb = plan_climb(other, after=whole.climb)
+    first = [knot for knot in whole.climb.knots if knot.move <= 1]
+    assert list(climb.knots[: len(first)]) == first
+    assert climb.failure is None
+    assert (climb.knots[-1].phase, climb.knots[-1].move, climb.knots[-1].limb) == ("shift", 2, None)
+    np.testing.assert_allclose(climb.knots[-1].body.position, end.position, atol=1e-12)
+    result = evaluate(other, climb=climb)
+    assert [(stage.phase, stage.move) for stage in result.stages][-1] == ("shift", 2)
+    assert result.feasible
+    assert climb.knots[-1].stage == len(result.stages) - 1

@@ -1,0 +1,78 @@
+"""What is given as text, as the request for a climb."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hand_models.base import InvalidInputError
+from service.climbs import Sought, climb_end
+from service.commands.stances import read_request
+
+TEXTS = {
+    "start": "0.1,-0.2,0.3",
+    "goal": "height:1.5",
+    "radius": 0.4,
+    "best_within": "7%",
+    "at_least": None,
+    "time": 60.0,
+    "surface": "rock",
+    "spacing": 0.2,
+    "body_spacing": None,
+    "stand_off": (0.6,),
+    "lean": 0.5,
+}
+
+
+def sought(**changes):
+    return Sought(**TEXTS | changes).request(Path("small-wall:3"), read_request)
+
+
+def test_a_request_has_what_the_options_say():
+    request = sought()
+    assert request.start.near == (0.1, -0.2, 0.3)
+    assert request.start.radius == 0.4
+    assert request.goal.height == 1.5
+    assert request.best_within == pytest.approx(0.07)
+    assert (request.rock, request.time, request.places.spacing) == ("small-wall:3", 60.0, 0.2)
+    assert request.bodies.stand_offs == (0.6,)
+    assert sought(stand_off=()).bodies.stand_offs != (0.6,)
+
+
+def test_an_end_may_be_a_bundled_stance():
+    stance = read_request("wall-300").stance
+    end = climb_end("wall-300", "--to", 0.3, read_request)
+    assert end.body == stance.body
+    assert [hand.pose for hand in end.hands] == [hand.pose for hand in stance.hands]
+
+
+@pytest.mark.parametrize(
+    "text", ["nan,0,0", "1,2", "1,2,3,4", "height:inf", "height:", "height:high", "a,b,c"]
+)
+def test_an_end_that_is_no_place_is_refused(text):
+    with pytest.raises(InvalidInputError, match="--from"):
+        sought(start=text)
+
+
+@pytest.mark.parametrize("text", ["-1%", "nan", "1001%", "five", ""])
+def test_a_part_that_is_none_is_refused(text):
+    with pytest.raises(InvalidInputError, match="--best-within"):
+        sought(best_within=text)
+
+
+def test_a_mesh_stands_in_the_world_as_it_leans(tmp_path):
+    file = tmp_path / "flat.ply"
+    file.write_text(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+        "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        "0 0 0\n0 1 0\n1 0 0\n3 0 1 2\n"
+    )
+    request = Sought(**TEXTS).request(file, read_request)
+    assert request.name == "flat"
+    x, z = (np.array(axis) for axis in (request.rock.pose.x_axis, request.rock.pose.z_axis))
+    # up and away from the climber, who looks along x of W
+    np.testing.assert_allclose(x, [np.sin(0.5), 0.0, np.cos(0.5)])
+    np.testing.assert_allclose([x @ z, z[2]], [0.0, -np.sin(0.5)], atol=1e-12)
+    assert len(request.rock.vertices) == 3
