@@ -34,7 +34,7 @@ from benchmarks.load.asking import (
     spoilt,
 )
 from benchmarks.load.bulk import bulk, memory_of
-from benchmarks.load.others import greedy, process, starve, starved, unread
+from benchmarks.load.others import climb, climbed, greedy, process, starve, starved, unread
 from benchmarks.load.slips import slips_table
 from hand_models.base import stores
 from planner import processes as proc
@@ -57,7 +57,8 @@ def served(*flags: str) -> Iterator[Served]:
         _, err = server.stop(signal.SIGTERM)
         took = time.perf_counter() - started
         console.print(f"SIGTERM: status {server.process.returncode} after {took:.1f} s")
-        if len(err.splitlines()) > 1:
+        # where it listens, and that it is ready
+        if len(err.splitlines()) > 2:
             console.print(f"its log has {len(err.splitlines())} lines; the last: {err[-300:]}")
 
 
@@ -381,7 +382,7 @@ def memory(first: int, last: int, seed: int) -> None:
         console.print(f"{name}: {info.kept} of {info.most} kept, {info.hits:,} hits")
 
 
-for command in (bulk, starve, starved, greedy, unread):
+for command in (bulk, climb, climbed, starve, starved, greedy, unread):
     main.add_command(command)
 
 

@@ -19,9 +19,11 @@ import msgspec
 from rich.console import Console
 
 from benchmarks.load.asking import PLAN, WRENCH_SPACE, Client, Tally, at_once, new_stances
+from service import CruxClient
+from service.requests import ClimbEnd, ClimbRequest
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.requests import wall_request
-from tests.suite.helpers.served import Served, free_endpoint
+from tests.suite.helpers.served import Served, client_config, free_endpoint
 
 SPIN = "print('on', flush=True)\nwhile True: pass"
 console = Console()
@@ -145,6 +147,38 @@ def starved(seconds: float, pairs: int, busy: int, half_planes: int) -> None:
         _, err = server.stop(signal.SIGTERM)
     rate, late = ratios(without, with_)
     console.print(f"processes ended: {err.count('another takes its place')}")
+    console.print(f"goodput beside it / without: {rate:.2f}; p99: {late:.2f}")
+
+
+@click.command()
+@click.argument("endpoint")
+def climb(endpoint: str) -> None:
+    """Let the service search for a climb, from the bottom of a wall to its top, until killed."""
+    ends = ClimbEnd(height=1.0), ClimbEnd(height=2.0)
+    asked = ClimbRequest(v=1, rock="leaning-wall", start=ends[0], goal=ends[1])
+    with CruxClient(client_config(endpoint)) as client:
+        client.climb(asked, lambda _: print("on", flush=True))
+
+
+@click.command()
+@click.option("--seconds", default=15.0, show_default=True, help="Of each half of a pair.")
+@click.option("--pairs", default=3, show_default=True)
+@click.option("--clients", default=1, show_default=True, help="That ask for plans.")
+def climbed(seconds: float, pairs: int, clients: int) -> None:
+    """Compare what polite clients get beside a search for a climb, and without it, in turns."""
+    without, with_ = [], []
+    server = Served(free_endpoint())
+    try:
+        polite(server.endpoint, 5.0, 10_000, clients)
+        for i in range(pairs):
+            without.append(polite(server.endpoint, seconds, 100 * i, clients))
+            console.print(f"without: {without[-1].in_words()}")
+            with process("-m", "benchmarks.load", "climb", server.endpoint):
+                with_.append(polite(server.endpoint, seconds, 100 * i + 50, clients))
+            console.print(f"beside it: {with_[-1].in_words()}")
+    finally:
+        server.stop(signal.SIGTERM)
+    rate, late = ratios(without, with_)
     console.print(f"goodput beside it / without: {rate:.2f}; p99: {late:.2f}")
 
 

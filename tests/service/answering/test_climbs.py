@@ -1,0 +1,139 @@
+"""What a search for a climb finds is the reply, and its route is one that can be asked for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import msgspec
+import numpy as np
+import pytest
+from msgspec.structs import replace as changed
+
+from hand_models.base import InvalidInputError, Pose
+from planner import MadeWall, evaluate, find_climb
+from planner.prepare import settle_each
+from service import requests
+from service.answering import SoughtClimb, climb_reply, route_of, seek_climb
+from service.answering.climbs import _bodies_near, _Progress
+from service.replies import KnotReply, PartReply
+from service.requests import ClimbEnd, ClimbRequest
+from tests.suite.helpers.knob_walls import ends, knob_wall
+from tests.suite.helpers.replies import departures
+
+REQUEST = ClimbRequest(
+    v=1,
+    id="mine",
+    name="up",
+    rock="small-wall",
+    start=ClimbEnd(height=0.0),
+    goal=ClimbEnd(height=9.0),
+    want=["trajectory", "certificate"],
+)
+
+
+@cache
+def sought() -> SoughtClimb:
+    """A climb on knobs of a slab, whose hands are where they have settled."""
+    wall = knob_wall()
+    outcomes = settle_each(wall.robot.hand, wall.places)
+    places = tuple(
+        replace(place, hold_pose=None, hold_in_hand=outcome.seating.pose)
+        for place, outcome in zip(wall.places, outcomes, strict=True)
+    )
+    wall = replace(wall, places=places)
+    first = tuple(range(0, len(places), 2))
+    start, goal = ends(wall, [1], first), ends(wall, [len(wall.bodies) - 2])
+    found = find_climb(wall, start, goal, name="up", within=0.5, seconds=60.0)
+    made = MadeWall(
+        wall=wall,
+        tried=len(places),
+        refused={},
+        lost_trials=0,
+        lost_places=0,
+        in_rock=0,
+        seconds={"placements": 1.0},
+    )
+    return SoughtClimb(found, made, places[0].hold, Pose.identity(), start, goal)
+
+
+@pytest.mark.slow
+def test_the_reply_is_what_was_found() -> None:
+    found, reply = sought().found, climb_reply(REQUEST, sought())
+    assert (reply.id, reply.name, reply.status) == ("mine", "up", found.status)
+    assert found.status in ("found", "not_proven")
+    assert reply.least == min(stage.load_factor for stage in reply.stages)
+    assert reply.gap == pytest.approx(reply.bound / reply.least - 1.0)
+    assert reply.deciding.load_factor == reply.least
+    assert reply.stages[reply.deciding.stage].load_factor == reply.least
+    assert reply.trajectory == [KnotReply.of(knot) for knot in found.climb.knots]
+    assert reply.seconds["placements"] == 1.0
+    assert departures("ClimbReply", msgspec.json.decode(msgspec.json.encode(reply))) == []
+
+
+@pytest.mark.slow
+def test_the_route_of_the_reply_has_the_stages_of_the_climb() -> None:
+    reply = climb_reply(REQUEST, sought())
+    rock = requests.Ellipsoid(semi_axes=tuple(sought().rock.semi_axes))
+    stance = changed(reply.route.stance, rocks={"rock": rock})
+    again = msgspec.json.decode(
+        msgspec.json.encode(changed(reply.route, stance=stance)), type=requests.RouteRequest
+    )
+    result = evaluate(route_of(again), workers=1)
+    assert len(result.stages) == len(reply.stages)
+    for stage, plan, told in zip(result.stages, result.plans, reply.stages, strict=True):
+        assert (stage.phase, stage.limb) == (told.phase, told.limb)
+        assert plan.status == told.status
+
+
+@pytest.mark.slow
+def test_knots_come_move_by_move_where_parts_are_asked_for() -> None:
+    parts: list[PartReply] = []
+    reply = climb_reply(changed(REQUEST, parts=True), sought(), parts.append)
+    assert reply.trajectory is msgspec.UNSET
+    knots = [knot for part in parts for knot in part.knots]
+    assert knots == climb_reply(REQUEST, sought()).trajectory
+    moves = [{knot.move for knot in part.knots} for part in parts]
+    assert moves == [{k} for k in range(len(moves))]
+
+
+def test_an_end_is_the_bodies_that_it_names() -> None:
+    origins = np.array([[0.0, y, z] for y in (0.0, 0.5) for z in (1.0, 2.0, 3.0)])
+
+    def found(name: str, **end: object) -> list[int]:
+        return np.flatnonzero(_bodies_near(name, ClimbEnd(**end), origins)).tolist()
+
+    assert found("start", height=2.0) == [0, 1, 3, 4]
+    assert found("goal", height=2.0) == [1, 2, 4, 5]
+    assert found("goal", near=(0.0, 0.2, 3.0)) == [2, 5]
+    assert found("goal", near=(0.0, 0.2, 3.0), radius=0.25) == [2]
+    for name, end, words in (
+        ("start", {"height": 0.5}, r"at most so high; they are 1.00 m to 3.00 m high, got 0.5 m"),
+        ("goal", {"height": 3.5}, r"at least so high"),
+        ("goal", {"near": (0.0, 0.0, 4.0)}, r"within 0.3 m; the nearest is 1.00 m away"),
+    ):
+        with pytest.raises(InvalidInputError, match=words) as caught:
+            found(name, **end)
+        assert caught.value.field == f"{name}.{next(iter(end))}"
+
+
+def test_ends_are_checked_before_the_wall_is_made() -> None:
+    def make(*_: object) -> MadeWall:
+        raise AssertionError
+
+    with pytest.raises(InvalidInputError, match="no pose of the body is at most so high") as caught:
+        seek_climb(REQUEST, make=make)
+    assert caught.value.field == "start.height"
+
+
+def test_progress_is_told_five_times_a_second_unless_it_is_new(monkeypatch) -> None:
+    clock, told = [0.0], []
+    monkeypatch.setattr("service.answering.climbs.time.perf_counter", lambda: clock[0])
+    progress = _Progress("mine", lambda part: told.append(part.progress))
+    for step in range(10):
+        clock[0] = 0.05 * step
+        progress.wall("placements", step, 10)
+    assert [each.done for each in told] == [0, 4, 8]
+    progress.wall("reach", 0, 1)
+    assert (told[-1].phase, told[-1].gap) == ("reach", None)
+    monkeypatch.undo()
