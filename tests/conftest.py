@@ -93,6 +93,7 @@ def stance_file(tmp_path: Path):
 
 
 def pytest_collection_finish() -> None:
-    """Leave what is loaded by now alone when what is no longer used is looked for."""
+    """Look for what is no longer used seldom, and not among what is loaded by now."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(100_000, 20, 20)

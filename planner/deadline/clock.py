@@ -54,6 +54,8 @@ Unfinished = Literal[
     "open_loop",
     "spread",
     "survival",
+    "redundancy",
+    "com_region",
     "advice",
 ]
 
@@ -72,6 +74,8 @@ UNFINISHED_RESULTS: Final[dict[Unfinished, str]] = {
     "open_loop": "the plan was executed on all displaced hands",
     "spread": "a plan was found in all draws of the numbers",
     "survival": "all draws of strengths were simulated",
+    "redundancy": "the stance was planned without each tile, finger and hand",
+    "com_region": "it was found where the centre of mass may be",
     "advice": "all changes were tried that might make it hold",
 }
 """Results that a deadline can prevent, in words that follow "expired before"."""

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, finite_vector
+from hand_models.base import Array, Indices, InvalidInputError, finite_vector
 from hand_models.hand import FINGERS
 from hand_models.parameters import bundled_table
 from hand_models.tile import TileStrengths

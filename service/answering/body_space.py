@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from msgspec.structs import replace
 
 from hand_models.base import Array, InvalidInputError
 from planner import (
@@ -16,7 +15,6 @@ from planner import (
     BodySpace,
     ComRegion,
     ComSolid,
-    DeadlineError,
     End,
     Polygon,
     Question,
@@ -25,13 +23,13 @@ from planner import (
     com_solid,
 )
 from service import replies
-from service.answering.answers import Planned, finite, placed_poses
+from service.answering.answers import finite, placed_poses
 from service.answering.own_models import BUNDLED_ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import BodySpaceReply
 from service.requests import BodySpaceRequest, PlanRequest
 
-__all__ = ["Explored", "explore", "with_com_region"]
+__all__ = ["Explored", "explore", "find_com_region"]
 
 
 class Explored(NamedTuple):
@@ -136,40 +134,20 @@ def explore(request: BodySpaceRequest, robots: Robots = BUNDLED_ROBOTS) -> Explo
     return Explored(space, section, reply, region, solid)
 
 
-def with_com_region(answer: Planned) -> Planned:
-    """Add to an answer where the centre of mass may be; a deadline leaves it out.
-
-    Parameters
-    ----------
-    answer : Planned
-        Answer to a plan request, with a full reply; a brief one stays as it is.
-
-    Returns
-    -------
-    Planned
-        Question, plan, and the reply with ``com_region``.
+def find_com_region(asked: Question) -> replies.ComRegionReply:
+    """Return where the centre of mass of a question's stance may be.
 
     Raises
     ------
     InvalidInputError
-        If the request gives a body wrench, or an angular acceleration, or the load has no weight.
+        If the question gives a body wrench, or an angular acceleration, or the load has no weight.
     SolverError
         If the solution of an optimisation problem does not pass its checks.
+    DeadlineError
+        If the deadline leaves no time for it.
     """
-    if not isinstance(answer.reply, replies.PlanReply):
-        return answer
-    try:
-        space = BodySpace(answer.question)
-        found = _region(com_region(space), space.exact)
-    except DeadlineError:
-        left = "com_region: not known before the deadline; allow more time"
-        reply = replace(
-            answer.reply,
-            warnings=[*answer.reply.warnings, left],
-            unfinished=[*answer.reply.unfinished, "com_region"],
-        )
-        return answer._replace(reply=reply)
-    return answer._replace(reply=replace(answer.reply, com_region=found))
+    space = BodySpace(asked)
+    return _region(com_region(space), space.exact)
 
 
 def _region(region: ComRegion, exact: bool) -> replies.ComRegionReply:

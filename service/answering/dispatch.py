@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, Final, NamedTuple
 
 from msgspec.structs import replace
@@ -12,9 +13,9 @@ from msgspec.structs import replace
 import planner
 from hand_models.base import CruxError, InvalidInputError, LimitError
 from hand_models.parameters import ParameterTable
-from planner import DeadlineError, deadline
+from planner import deadline
 from service.answering.answers import Planned, plan_reply
-from service.answering.body_space import with_com_region
+from service.answering.body_space import find_com_region
 from service.answering.mesh_files import MeshFiles
 from service.answering.own_models import BUNDLED_ROBOTS, Robots, over_default
 from service.answering.questions import climb, question
@@ -115,22 +116,31 @@ def planned(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Planned:
     start = time.perf_counter()
     answer = planner.plan(asked)
     found = Planned.of(asked, answer, request.id, detail, model="model" in request.want)
+    reply = found.reply
+    if not isinstance(reply, PlanReply):
+        return found
     with deadline.within(asked.deadline, started=start):
-        if "redundancy" in request.want and isinstance(found.reply, PlanReply):
-            _add_redundancy(found.reply, asked)
-        if "survival" in request.want and isinstance(found.reply, PlanReply):
+        if "redundancy" in request.want:
+            with _extra(reply, "redundancy"):
+                reply.redundancy = planner.find_redundancy(asked)
+        if "survival" in request.want:
             settings = request.survival or planner.SurvivalSettings()
-            add_survival(found.reply, asked, answer, settings)
-    return with_com_region(found) if "com_region" in request.want else found
+            with _extra(reply, "survival"):
+                add_survival(reply, asked, answer, settings)
+    if "com_region" in request.want:
+        with _extra(reply, "com_region"):
+            reply.com_region = find_com_region(asked)
+    return found
 
 
-def _add_redundancy(reply: PlanReply, asked: planner.Question) -> None:
-    """Add the plans without each tile, finger and hand to a reply, if there is time."""
+@contextmanager
+def _extra(reply: PlanReply, name: deadline.Unfinished) -> Iterator[None]:
+    """Let a block add an extra to a reply; if the deadline ends it, say so in the reply."""
     try:
-        reply.redundancy = planner.find_redundancy(asked)
-    except DeadlineError:
-        reply.unfinished.append("redundancy")
-        reply.warnings.append("the deadline left no time for the redundancy")
+        yield
+    except planner.DeadlineError as error:
+        reply.unfinished.append(name)
+        reply.warnings.append(deadline.late_sentence(error.seconds, (name,)))
 
 
 def answer_with_advice(answer: Planned) -> Planned:
@@ -308,7 +318,7 @@ def handle(
     except InvalidInputError as error:
         named = error.kind if error.kind in REQUEST_KINDS else InvalidInputError.kind
         return failed(error, named)
-    except DeadlineError as error:
+    except planner.DeadlineError as error:
         return failed(error)
     except MemoryError:
         # memory is a problem of the process, not of the question: its owner has to know

@@ -7,7 +7,7 @@ from msgspec.structs import asdict
 
 import planner
 from hand_models.base import InvalidInputError, errors_under
-from planner import DeadlineError, Plan
+from planner import Plan
 from service.answering.answers import placed_poses
 from service.answering.own_models import BUNDLED_ROBOTS, Robots
 from service.answering.questions import question
@@ -43,16 +43,16 @@ def add_survival(
     plan : Plan
         The question's plan; without hands there is no survival.
     settings : SurvivalSettings
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline leaves no time for any draw.
     """
     if plan.hands is None:
         return
-    try:
-        with errors_under("survival"):
-            found = planner.find_survival(asked, plan.hands, settings)
-    except DeadlineError as error:
-        reply.unfinished.append("survival")
-        reply.warnings.append(planner.deadline.late_sentence(error.seconds, ("survival",)))
-        return
+    with errors_under("survival"):
+        found = planner.find_survival(asked, plan.hands, settings)
     reply.survival, reply.survival_probability = found, found.no_slip
     fixed, anew = (0 if each is None else each.draws for each in (found.holds, found.replanned))
     if found.reason is None and (fixed < settings.draws or anew < settings.replanned):

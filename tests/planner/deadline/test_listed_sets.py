@@ -65,7 +65,7 @@ def looks(work: Callable[[], object], most: float = np.inf) -> int:
 @pytest.mark.parametrize(
     ("half_planes", "lateral", "diameter", "least"),
     [
-        (3, True, 0.26, 20),
+        (2, True, 0.26, 10),
         *((planes, False, 0.28 + 0.01 * planes, 2) for planes in (3, 8)),
     ],
 )

@@ -113,7 +113,7 @@ VARIANTS: dict[str, list[dict[str, Any]]] = {
     ],
     "PlanRequest.explain": [{"explain": False, "load.mass": 200.0}],
     "PlanRequest.body_range": [{"body_range": {"shift": 0.1}}],
-    "PlanRequest.open_loop": [{**EXECUTED, "open_loop": {"samples": 2}}],
+    "PlanRequest.open_loop": [{}],
     "PlanRequest.survival": [{"want": ["survival"], "survival": SLIPS}],
     **{f"SurvivalSettings.{part}": [{}] for part in SLIPS},
     "OpenLoopSettings.samples": [{}],

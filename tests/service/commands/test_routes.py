@@ -60,7 +60,8 @@ def test_routes_of_a_folder_are_answered_in_order_as_each_is_alone(climbs, tmp_p
     ids = [each["id"] for each in (first, wrong, heavy, bundled)]
     assert ids == [str(climbs / "a.json"), str(climbs / "b.json"), "mine", BUNDLED]
     assert wrong["error"]["field"] == "stance"
-    for reply, source in ((first, ids[0]), (heavy, str(climbs / "c.json")), (bundled, BUNDLED)):
+    assert (bundled["name"], len(bundled["stages"])) == ("six moves on a steep slab", 17)
+    for reply, source in ((first, ids[0]), (heavy, str(climbs / "c.json"))):
         alone = tmp_path / reply["name"]
         run_command_line(["route", source, "-o", str(alone), "--json"])
         summary = result(capfd)
