@@ -88,16 +88,13 @@ def _from_axis(shape: Record, seen: complex, bare: bool) -> tuple[complex, float
 @compiled()
 def _alone(shape: Record, length: float) -> float:
     """Return how far a bed sinks on a single point of rock that represents a length w [m]."""
-    root = shape.fine * math.sqrt(shape.length)
-    return float(min(root / math.sqrt(length), shape.far))
+    return float(min(shape.fine * math.sqrt(shape.length) / math.sqrt(length), shape.far))
 
 
 @compiled()
 def _level(settings: Record, shape: Record, depths: Array, lengths: Array, first: int) -> float:
-    """Return the level h to which the bed sinks [m]; ‖√w max(0, h − g)‖ is convex in it.
-
-    ``first``: index of the least depth.
-    """
+    """Return the level h to which the bed sinks [m]; ``first``: index of the least depth."""
+    # ‖√w max(0, h − g)‖ is convex in it
     root = shape.fine * math.sqrt(shape.length)
     level = depths[first] + _alone(shape, lengths[first])
     for _ in range(20):
@@ -195,10 +192,8 @@ def near_points(
     ----------
     points, lengths, bare, centres, radii, longest : ndarray
         Rock in the finger's plane, a row of `Outlines`.
-    shape : record
-        `PhalanxShape`.
-    joint, u : complex
-        Joint and direction of the phalanx, as of `phalanx_beside`.
+    shape, joint, u
+        As of `phalanx_beside`.
     within : float
         Margin: the tile's depth and the largest further motion [m].
     """
@@ -291,10 +286,7 @@ def _on_rock(
     u: complex,
     tile_gap: float,
 ) -> tuple[float, float]:
-    """Return the share of a tile's spines that reach the rock, and the middle of these [m].
-
-    In each of the strips across a tile its spines reach the rock or not.
-    """
+    """Return the share of a tile's spines that reach the rock, and the middle of these [m]."""
     strips = len(across)
     if strips == 1:
         share = _engaged(settings, tile_gap, shape.travel, shape.exponent)
@@ -310,12 +302,10 @@ def _on_rock(
             for k in range(strips):
                 depth = behind[near[i], k]
                 above = place.imag + depth * way.imag - shape.lift
-                # farther than what is nearest already, or nothing
-                if depth == math.inf or above >= farther[k]:
-                    continue
-                along = place.real + depth * way.real
-                along -= _clipped(along, shape.near, shape.far)
-                farther[k] = min(farther[k], math.sqrt(along * along + above * above))
+                if depth < math.inf and above < farther[k]:
+                    along = place.real + depth * way.real
+                    along -= _clipped(along, shape.near, shape.far)
+                    farther[k] = min(farther[k], math.sqrt(along * along + above * above))
     total, middle = 0.0, 0.0
     for k in range(strips):
         part = _engaged(settings, tile_gap + (farther[k] - least), shape.travel, shape.exponent)

@@ -170,12 +170,9 @@ class PlacedHands:
         # fingers that are alike but for rounding are alike: lengths in metres have 15 digits
         seen = (self.frames.rows @ there).round(15)
         self._seen: list[list[list[float]]] = (seen * swept[:, None, :3]).tolist()
-        across = (self.frames.across[:, :, 0] @ rotations).round(15)
-        self._across: list[list[list[float]]] = (across * swept[:, None, :3]).tolist()
-        self._alike = [
-            [] if shape is None else alike_across(shape, each).tolist()
-            for shape, each in zip(self._shapes, across, strict=True)
-        ]
+        across, scales = (self.frames.across[:, :, 0] @ rotations).round(15), swept[:, None, :3]
+        self._across: list[list[list[float]]] = (across * scales).tolist()
+        self._alike: list[list[bool]] = alike_across(scales, across).tolist()
 
     def cuts(self, index: int) -> SmoothCuts | None:
         """Return a smooth hold's shape and the cuts through it of a hand; None on other rock.

@@ -1,18 +1,5 @@
 from .filled_holes import FilledCells as FilledCells, filled_cells as filled_cells
-from .generated import (
-    RockSource as RockSource,
-    generate_wall as generate_wall,
-    read_rock as read_rock,
-    wall_names as wall_names,
-)
-from .holds import (
-    Cylinder as Cylinder,
-    Edge as Edge,
-    Ellipsoid as Ellipsoid,
-    Hold as Hold,
-    Plane as Plane,
-    Sphere as Sphere,
-)
+from .holds import Hold as Hold
 from .mesh import Mesh as Mesh
 from .mesh_files import (
     MESH_ENDINGS as MESH_ENDINGS,
@@ -20,6 +7,13 @@ from .mesh_files import (
     read_vertices as read_vertices,
 )
 from .profile import Profile as Profile
+from .shapes import (
+    Cylinder as Cylinder,
+    Edge as Edge,
+    Ellipsoid as Ellipsoid,
+    Plane as Plane,
+    Sphere as Sphere,
+)
 from .smoothing import load_compiled as load_compiled
 from .surface import Triangles as Triangles, drawn_out as drawn_out, grid as grid
 from .triangles import (

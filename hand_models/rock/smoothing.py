@@ -182,6 +182,16 @@ def _reached(pieces: Sequence[Array], scale: Scale) -> list[Array]:
     return unstrung(points, ends)
 
 
+def _ahead(piece: Array, reach: float) -> list[Array]:
+    """Return the parts of a polyline that a finger may reach, which begins at the origin, along s.
+
+    Rock behind its first joint is none of it.
+    """
+    near = (piece[:, 0] >= 0.0) & (np.hypot(*piece.T) <= reach)
+    parts = np.flatnonzero(np.diff(near)) + 1
+    return [run for run in np.split(piece, parts)[not near[0] :: 2] if len(run) > 1]
+
+
 def _no_outlines() -> tuple[Array, Indices, float]:
     """Return the result of `seen_outlines` where there is no rock in the plane."""
     return np.zeros((0, 2)), np.zeros(0, dtype=np.intp), 0.0
@@ -258,7 +268,8 @@ class OutlinedHold(Hold):
 
         The envelope is the least t of the rock across the tiles, and across the phalanges' frames.
         Where rock reaches back under an overhang in the finger's plane by more than a bridged gap,
-        only the cut in this plane is used. Arguments are those of `Hold.finger_rock`.
+        before the plane's origin and within the finger's reach, only the cut in this plane is used.
+        Arguments are those of `Hold.finger_rock`.
 
         Returns
         -------
@@ -273,7 +284,6 @@ class OutlinedHold(Hold):
         from hand_models.rock.compiled_outlines import (
             least_heights,
             raised_outlines,
-            reached,
             seen_corners,
             seen_outlines,
         )
@@ -282,9 +292,8 @@ class OutlinedHold(Hold):
         middle = _reached(self._pieces(origin, s_axis, t_axis), scale)
         points, stops, hidden = seen_outlines(*strung(middle)) if middle else _no_outlines()
         if hidden > scale.bridged_gap:
-            # what the finger reaches of it
-            near, ends, _ = reached(*strung(middle), size.reach)
-            _, _, hidden = seen_outlines(near, ends)
+            near = [run for piece in middle for run in _ahead(piece, size.reach)]
+            hidden = seen_outlines(*strung(near))[2] if near else 0.0
         plane = np.array([origin, s_axis, t_axis], dtype=float)
         heights = self._heights(plane, size) if hidden <= scale.bridged_gap else None
         if heights is None:

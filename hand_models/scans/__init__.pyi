@@ -1,3 +1,9 @@
+from .generated import (
+    RockSource as RockSource,
+    generate_wall as generate_wall,
+    read_rock as read_rock,
+    wall_names as wall_names,
+)
 from .holes import Hole as Hole, Step as Step
 from .meshing import mesh_scan as mesh_scan, too_large as too_large, too_small as too_small
 from .pictures import plot_holds as plot_holds, plot_rock as plot_rock

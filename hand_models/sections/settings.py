@@ -22,11 +22,12 @@ class SectionSettings:
     alike_sine: float = 1e-6
     """Sine of the angle between a finger's axis across and a hold's axis, up to which the rock is
     alike across the finger: over its width, 29 mm, the rock then rises by 29 nm at most."""
-    envelope_rays: int = 1440
-    """Rays from the middle of a smooth hold's envelope to its outline: 10 cm away its points are
-    0.4 mm apart, as on smoothed rock, between which a fillet of 5 mm stands out by 4 μm."""
-    envelope_spacing: float = 1e-3
-    """Distance along a finger of the places from which an envelope's middle is found [m]."""
+    envelope_rays: int = 180
+    """Rays from the middle of a smooth hold's envelope to its outline, before there are more of
+    them where a finger reaches."""
+    envelope_spacing: float = 5e-4
+    """Distance of points of the outline there, as on smoothed rock: between two of them a fillet of
+    5 mm stands out by 6 μm [m]."""
     most_circles: int = 10
     """Largest number of circles fitted to an ellipse in turn; two or three are mostly enough."""
     last_turn: float = 1e-8

@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from hand_models.base import Array
-from hand_models.sections.finger_rock import NO_STRIPS, FingerRock, FingerSize, RockStrips
+from hand_models.sections.finger_rock import FingerRock, FingerSize, RockStrips
 from hand_models.sections.polyline import PolylineSection
 from hand_models.sections.section import Flags
 from hand_models.sections.settings import SECTION_SETTINGS
@@ -26,18 +26,18 @@ from hand_models.sections.swept_cuts import Swept, entry_distances
 __all__ = ["alike_across", "rock_across"]
 
 
-def alike_across(shape: Swept, across: Array) -> Array:
-    """Return whether rock is the same on all planes beside each other, shape (...).
+def alike_across(scales: Array, across: Array) -> Flags:
+    """Return whether a smooth hold's rock is the same in all planes beside each other, shape (...).
 
     Parameters
     ----------
-    shape : Swept
+    scales : ndarray, shape (..., 3)
+        The scales of a hold (`Swept`).
     across : ndarray, shape (..., 3)
         Unit normals of the planes in the hold's frame.
     """
-    scales = np.array(shape[:3])
-    least = SECTION_SETTINGS.alike_sine * scales.max()
-    return np.asarray(np.linalg.norm(scales * across, axis=-1) <= least)
+    seen, least = scales * across, SECTION_SETTINGS.alike_sine * scales.max(axis=-1)
+    return np.asarray((seen * seen).sum(axis=-1) <= least * least)
 
 
 def rock_across(
@@ -55,17 +55,19 @@ def rock_across(
     tiles_only : bool, optional
         True to leave out the rock beside the tiles, and the strips.
     """
-    slab = _Slab(shape, plane)
-
-    def envelope(width: float) -> PolylineSection | None:
-        points = slab.outline(0.5 * width, size.reach)
-        return None if points is None else PolylineSection([points])
-
-    tile = envelope(size.tile_width)
-    if tiles_only:
-        return FingerRock(tile)
-    strips = NO_STRIPS if tile is None else slab.strips(tile.pieces[0], size)
-    return FingerRock(tile, envelope(size.frame_width), strips)
+    slab, reach = _Slab(shape, plane), size.reach
+    tile_half, frame_half = 0.5 * size.tile_width, 0.5 * size.frame_width
+    inside = slab.middle(tile_half, reach)
+    if inside is not None:
+        tile = slab.outline(tile_half, inside, reach)
+        if tiles_only:
+            return FingerRock(PolylineSection([tile]))
+        frame = PolylineSection([slab.outline(frame_half, inside, reach)])
+        return FingerRock(PolylineSection([tile]), frame, slab.strips(tile, size))
+    inside = None if tiles_only else slab.middle(frame_half, reach)
+    if inside is None:
+        return FingerRock(None)
+    return FingerRock(None, PolylineSection([slab.outline(frame_half, inside, reach)]))
 
 
 class _Slab:
@@ -95,30 +97,39 @@ class _Slab:
         least: Array = np.minimum(sides.min(axis=0), np.where(np.abs(y) <= half, free, np.inf))
         return least
 
-    def outline(self, half: float, reach: float) -> Array | None:
+    def outline(self, half: float, inside: Array, reach: float) -> Array:
         """Return the envelope's outline within the slab |y| ≤ half, as points (s, t), (n, 2) [m].
 
-        Rock is on its left. None if no rock is within a finger's reach.
+        Rock is on its left; within a finger's reach points are dense. ``inside``: a place (s, t)
+        within it [m].
         """
-        inside = self._middle(half, reach)
-        if inside is None:
-            return None
-        turns = np.linspace(0.0, math.tau, SECTION_SETTINGS.envelope_rays, endpoint=False)
-        ways = np.column_stack([np.cos(turns), np.sin(turns)])
-        # from outside the rock, against these ways
-        far = -self._begins(inside, -ways, half)
-        # along some it never ends, or nearly along a face
-        ends = np.flatnonzero(np.isfinite(far) & ~_endless(self._shape, ways @ self._plane))
-        closed = len(ends) == len(turns)
-        if not closed:
-            gap = np.argmax(np.diff(ends, append=ends[0] + len(turns)))
-            ends = np.roll(ends, -gap - 1)
-        outline = inside + far[ends, None] * ways[ends]
-        return np.concatenate([outline, outline[:1]]) if closed else outline
 
-    def _middle(self, half: float, reach: float) -> Array | None:
+        def points(turns: Array) -> Array:
+            ways = np.column_stack([np.cos(turns), np.sin(turns)])
+            # from outside the rock, against these ways; along some it never ends
+            far = -self._begins(inside, -ways, half)
+            far[_endless(self._shape, ways @ self._plane)] = np.inf
+            with np.errstate(invalid="ignore"):
+                return np.asarray(inside + far[:, None] * ways)
+
+        turns = np.linspace(0.0, math.tau, SECTION_SETTINGS.envelope_rays + 1)
+        rough = points(turns)
+        with np.errstate(invalid="ignore"):
+            steps = np.hypot(*np.diff(rough, axis=0).T)
+            near = np.hypot(*rough[:-1].T) <= reach + steps
+        steps = np.where(np.isfinite(steps) & near, steps, 0.0)
+        parts = np.ceil(steps / SECTION_SETTINGS.envelope_spacing).clip(1.0, 64.0)
+        at = np.append(0.0, np.cumsum(parts))
+        outline = points(np.interp(np.arange(at[-1]), at, turns))
+        ends = np.flatnonzero(np.isfinite(outline).all(axis=1))
+        if len(ends) == len(outline):
+            return np.concatenate([outline, outline[:1]])
+        gap = np.argmax(np.diff(ends, append=ends[0] + len(outline)))
+        return outline[np.roll(ends, -gap - 1)]
+
+    def middle(self, half: float, reach: float) -> Array | None:
         """Return the middle of the rock's envelope in the square |s|, |t| ≤ reach, (2,) [m]."""
-        count = round(reach / SECTION_SETTINGS.envelope_spacing)
+        count = round(0.5 * reach / SECTION_SETTINGS.envelope_spacing)
         s, into = np.linspace(-reach, reach, 2 * count + 1), np.array([0.0, 1.0])
         places = np.column_stack([s, np.zeros_like(s)])
         top, bottom = self._begins(places, into, half), np.full(len(s), np.inf)
@@ -141,7 +152,7 @@ class _Slab:
         else:
             before[0], after[-1] = outline[0], outline[-1]
         along = after - before
-        # every other point is near enough to the next
+        # a millimetre apart is near enough: 1 μm less deep between two on a ball of 0.2 m
         near = np.flatnonzero(np.hypot(*outline.T) <= size.reach)[::2]
         into = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
         places, ways = (each[near] @ self._plane for each in (outline, into))

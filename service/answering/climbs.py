@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import UNSET, UnsetType
 from numpy.typing import NDArray
 
-from hand_models import rock
+from hand_models import rock, scans
 from hand_models.base import Array, InvalidInputError, Pose, errors_under
 from hand_models.parameters import ParameterTable, own_hand
 from planner import HandOnHold, deadline
@@ -231,7 +231,7 @@ def _rock(message: requests.Mesh | str, numbers: ParameterTable) -> tuple[rock.M
     """Return the rock of a request, and its frame in W."""
     if isinstance(message, str):
         name, _, seed = message.partition(":")
-        made = rock.generate_wall(name, int(seed or 0))
+        made = scans.generate_wall(name, int(seed or 0))
         return rock.Mesh(made.vertices, made.faces, numbers, anywhere=True), made.pose
     with errors_under("rock"):
         if message.pose_in_hand is not None:

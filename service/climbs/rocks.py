@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from hand_models.rock import read_mesh, wall_names
+from hand_models.rock import read_mesh
+from hand_models.scans import wall_names
 from service import requests
 
 __all__ = ["rock_message"]

@@ -156,7 +156,8 @@ def holds_command(
     Each hold has a `place`, for the hand of a request whose rock this is.
     """
     from hand_models import fixed_wrist, parameters
-    from hand_models.rock import Mesh, read_rock
+    from hand_models.rock import Mesh
+    from hand_models.scans import read_rock
     from hand_models.tile import Surface
 
     samples = samples if robust else 0

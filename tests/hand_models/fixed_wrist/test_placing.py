@@ -60,7 +60,7 @@ def test_at_the_crest_a_hand_is_as_it_is_seated_there(hold, rotation):
     assert placed.seating.rule == seated.seating.rule
     moved = placed.seating.pose.position - seated.seating.pose.position
     assert np.abs(moved).max() < 1e-6
-    np.testing.assert_allclose(placed.loads, seated.loads, atol=1e-3)
+    np.testing.assert_allclose(placed.loads, seated.loads, atol=2e-3)
 
 
 def test_around_a_cylinder_a_hand_is_the_same_wherever_it_comes_from():

@@ -99,7 +99,7 @@ def test_a_seated_hand_touches_at_c1_with_its_palm_where_the_grasp_wants_it(semi
     for finger in settled.fingers[1:3]:
         assert finger.contacts[0].kind == "face"
         # where the face touches; its bed presses nearer to the tile's middle on flatter rock
-        assert finger.contacts[0].along == pytest.approx(0.0247, abs=3e-3)
+        assert finger.contacts[0].along == pytest.approx(0.0247, abs=3.5e-3)
         assert finger.contacts[0].along <= 0.0247 + 1e-6
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from hand_models import Grasp
 from hand_models.rock import Cylinder, Edge, Ellipsoid, Hold, Plane, Sphere
-from hand_models.rock.holds import SweptHold
+from hand_models.rock.shapes import SweptHold
 from hand_models.sections import PolylineSection, Swept
 from planner.pictures import draw_plan
 from planner.pictures.plan_scene import drawn_scene
@@ -101,7 +101,8 @@ def test_a_hold_of_ones_own_is_placed_on_planned_on_and_drawn(hold):
     light = Load(mass=20.0, com=(0.0, 0.0, 0.0))
     question = Question(on_wall(hold, off=0.45, outer_rotation=0.6), load=light)
     found = plan(question)
-    assert found.status == "optimal"
+    # the outer fingers lie obliquely on the log, which holds them little
+    assert found.status == ("overloaded" if isinstance(hold, FlatLog) else "optimal")
     assert found.verified
     surfaces = drawn_scene(found, question).surfaces
     rocks = [len(surface.triangles) for surface in surfaces if surface.kind == "rock"]

@@ -6,7 +6,8 @@ from functools import cache
 import numpy as np
 
 from hand_models.parameters import ParameterTable, wall_table
-from hand_models.rock import Mesh, generate_wall
+from hand_models.rock import Mesh
+from hand_models.scans import generate_wall
 from planner.robots import robosimian
 from planner.walls import BodyGrid, PlaceGrid, WallSource
 

@@ -7,7 +7,8 @@ import pytest
 
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable, wall_table
-from hand_models.rock import Mesh, generate_wall, read_rock, wall_names
+from hand_models.rock import Mesh
+from hand_models.scans import generate_wall, read_rock, wall_names
 
 
 def changed(name, **numbers):

@@ -9,8 +9,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices, InvalidInputError, Pose
 from hand_models.parameters import ParameterTable, wall_table
-from hand_models.rock.mesh_files import read_mesh
-from hand_models.rock.surface import Triangles, grid
+from hand_models.rock import Triangles, grid, read_mesh
 
 __all__ = ["RockSource", "generate_wall", "read_rock", "wall_names"]
 
