@@ -143,6 +143,8 @@ def come_to_rest(
         The same hands with new poses in W, and with the poses of their holds in H; an error in
         place of each hand that has no rest.
     """
+    if not hands:
+        return []
     offsets = [Pose.identity()] * len(hands) if offsets is None else offsets
     found: dict[int, HandOnHold | InvalidInputError] = {}
     starts: dict[int, SettledHand] = {}

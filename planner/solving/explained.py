@@ -15,7 +15,7 @@ from hand_models.hand import FINGERS
 from planner import deadline
 from planner.advice import Attempt
 from planner.deadline import DeadlineError, Unfinished, late, late_sentence
-from planner.execution import find_open_loop
+from planner.execution import find_open_loop, without_margins
 from planner.explanation import (
     ActiveLimits,
     LimitUse,
@@ -103,6 +103,7 @@ def explained_plan(
         )
     else:
         parts = _of_none(prepared, answer)
+    odd = (*odd, *_margin_findings(prepared, checks, answer, attempt))
     if "robust" in question.want and prepared.needs_hands:
         # last: these take the longest
         parts["robust"] = find_robust_load_factor(
@@ -287,6 +288,33 @@ def _spare_findings(prepared: PreparedStance, found: Verified) -> Iterator[Findi
             message += f"; its tendons are left at their closing tension of {closing[i]:g} N"
         field = f"stance.hands[{i}]"
         yield Finding("hand_adds_nothing", field, message, without, "1")
+
+
+def _margin_findings(
+    prepared: PreparedStance, checks: Checks, answer: Answer, attempt: Attempt
+) -> Iterator[Finding]:
+    """Yield at most one finding: that there is a plan within the cap without the margins."""
+    question = prepared.question
+    names = ("hold_margin", "palm_margin", "least_tension")
+    asked = {name: value for name in names if (value := getattr(question.limits, name))}
+    # idle limbs do not depend on margins
+    missed = answer.whole > question.limits.utilisation + CAP_SLACK and not checks.overloaded
+    if not (asked and missed and question.explain) or deadline.expired():
+        return
+    near = answer.solution if isinstance(answer, Verified) else None
+    try:
+        used = attempt(without_margins(prepared), checks.idle, near).utilisation
+    except DeadlineError:
+        return
+    if used > question.limits.utilisation + CAP_SLACK:
+        return
+    said = " and ".join(f"{name} of {value:g} N" for name, value in asked.items())
+    cap = question.limits.utilisation
+    message = (
+        f"with a {said} there is no plan within the utilisation of {cap:g}; without, it is "
+        f"{used:.4g}: lower the margin, or go without"
+    )
+    yield Finding("margin_not_had", f"limits.{next(iter(asked))}", message, used, "1")
 
 
 def _clearance(prepared: PreparedStance) -> Clearance:

@@ -164,12 +164,16 @@ def _print_claims(result: experiments.StudyResult, out: Console) -> None:
         tables.text("got", form=_shown),
     )
     tables.print_rows(
-        result.claims, columns, out, style=lambda claim: "" if claim.holds else "bold"
+        result.claims,
+        columns,
+        out,
+        style=lambda claim: "" if claim.holds else "bold",
+        legend=["fitted: a parameter was calibrated to the claim"]
+        if any(claim.role == "calibration" for claim in result.claims)
+        else [],
     )
     held = sum(claim.holds for claim in result.claims)
     out.print(f"{held} of {len(result.claims)} claims hold")
-    if any(claim.role == "calibration" for claim in result.claims):
-        out.print("fitted: a parameter was calibrated to the claim")
 
 
 def _verdict(claim: experiments.Claim) -> str:

@@ -6,7 +6,7 @@ from .certificates import (
     certificate_json as certificate_json,
     print_certificate as print_certificate,
 )
-from .command_line import VERBOSITY_KEY as VERBOSITY_KEY, ExitStatus as ExitStatus, note as note
+from .command_line import ExitStatus as ExitStatus, note as note
 from .extras import (
     print_advice as print_advice,
     print_route_survival as print_route_survival,
@@ -27,6 +27,7 @@ from .holds import (
     refusals_json as refusals_json,
 )
 from .layout import (
+    VERBOSITY_KEY as VERBOSITY_KEY,
     console as console,
     in_order as in_order,
     name as name,
@@ -34,6 +35,7 @@ from .layout import (
     print_rows as print_rows,
     print_warnings as print_warnings,
     text as text,
+    verbosity as verbosity,
 )
 from .openings import print_opening as print_opening
 from .output_lock import write_alone as write_alone
@@ -52,7 +54,6 @@ from .terminal import (
     say as say,
     show as show,
     tell_solver as tell_solver,
-    verbosity as verbosity,
     waiting as waiting,
     working as working,
     write_plan_picture as write_plan_picture,

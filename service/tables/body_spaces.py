@@ -55,9 +55,11 @@ def print_body_space(reply: BodySpaceReply, out: Console, accelerations: int = 0
     axis = name("axis", lambda row: f"{row[0]} {axis_unit(row[0][1:])}")
     ends = [number(part, f"1.{part}", "z.1f") for part in ("more", "pure", "extent")]
     title = "how far body wrenches that are held go along the axes of B"
-    print_rows(reply.capability.items(), (axis, *ends, _lets_go()), out, title)
-    out.print("more: beyond the body wrench asked for, and what lets go there first")
-    out.print("pure: with every other component zero; extent: with whatever else; -: none")
+    legend = (
+        "more: beyond the body wrench asked for, and what lets go there first",
+        "pure: with every other component zero; extent: with whatever else; -: none",
+    )
+    print_rows(reply.capability.items(), (axis, *ends, _lets_go()), out, title, legend=legend)
     _print_section(reply.section, out)
     _print_accelerations(reply, out)
 

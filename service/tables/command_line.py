@@ -1,20 +1,16 @@
-"""Exit statuses, messages on standard error, the key of the verbosity; imports no planner."""
+"""Exit statuses, and messages on standard error; imports no planner."""
 
 from __future__ import annotations
 
 import sys
 import textwrap
 from enum import IntEnum
-from typing import Final
 
 import click
 
 from service.tables.layout import console
 
-__all__ = ["VERBOSITY_KEY", "ExitStatus", "note"]
-
-VERBOSITY_KEY: Final = "crux.verbosity"
-"""Key of the verbosity in the ``meta`` of a click context: 1 for more output, -1 for less."""
+__all__ = ["ExitStatus", "note"]
 
 
 class ExitStatus(IntEnum):

@@ -119,7 +119,7 @@ def print_spread(spread: Spread, out: Console) -> None:
     ]
     if len(rows) > 1:
         heads = ("feasible", "overloaded", "no balance", "utilisation")
-        print_rows(rows, in_order([_samples(spread.draws)], heads), out)
+        print_rows(rows, in_order([_samples(spread.draws)], heads), out, result=True)
 
 
 def _spread_sentence(spread: Spread) -> str:
@@ -223,7 +223,7 @@ def print_open_loop(found: OpenLoop, out: Console) -> None:
         found.worst_limb or "none",
     )
     heads = ("util 10 %", "50 %", "90 %", "dragged N")
-    print_rows([row], in_order(heads, texts=["worst hand"]), out)
+    print_rows([row], in_order(heads, texts=["worst hand"]), out, result=True)
 
 
 def print_survival(found: Survival, out: Console) -> None:
@@ -252,7 +252,7 @@ def print_survival(found: Survival, out: Console) -> None:
         (f"all hold, new set-points {_when(found.delay)} after each slip", found.replanned),
     )
     rows = [(what, *_share(share)) for what, share in simulated if share is not None]
-    print_rows(rows, in_order(["simulated"], ("share", "low", "high", "draws")), out)
+    print_rows(rows, in_order(["simulated"], ("share", "low", "high", "draws")), out, result=True)
     if found.first:
         likely = ", ".join(f"{tile} {share:.3f}" for tile, share in list(found.first.items())[:4])
         out.print(f"slips first, with a probability of: {likely}")
@@ -267,7 +267,7 @@ def _print_no_slip(
         (f"{found.strength_90:.2f}", "0.9"),
         (f"{found.strength_99:.2f}", "0.99"),
     ]
-    print_rows(rows, in_order((), ("times the assumed strength", what)), out)
+    print_rows(rows, in_order((), ("times the assumed strength", what)), out, result=True)
 
 
 def _when(delay: float) -> str:
@@ -291,8 +291,8 @@ def print_route_survival(found: RouteSurvival, out: Console) -> None:
         ),
         out,
         style=lambda row: "bold" if row[:3] == _place(found.stages[found.worst]) else "",
+        legend=["all hands hold, with fixed tensions, and with new set-points after each slip"],
     )
-    out.print("all hands hold, with fixed tensions, and with new set-points after each slip")
     if found.reason is not None:
         out.print(found.reason)
     if found.no_slip is not None:

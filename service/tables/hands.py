@@ -98,7 +98,10 @@ def print_robust(robust: replies.RobustCapability, out: Console) -> None:
 
 
 def _print_ends(
-    reaches: Mapping[str, Mapping[str, float | None]], title: str, out: Console
+    reaches: Mapping[str, Mapping[str, float | None]],
+    title: str,
+    out: Console,
+    legend: Sequence[str] = (),
 ) -> None:
     """Print the least and the most of each component, from the reach both ways along its axis."""
     heads = [f"{what}{end}" for what in reaches for end in ("least", "most")]
@@ -107,7 +110,7 @@ def _print_ends(
         for ways in reaches.values():
             back = ways[f"-{axis}"]
             row += [None if back is None else -back, ways[f"+{axis}"]]
-    print_rows(rows, in_order(["axis"], heads, form="z.2f"), out, title)
+    print_rows(rows, in_order(["axis"], heads, form="z.2f"), out, title, legend=legend)
 
 
 def _print_floating(palm: str, error: float, out: Console) -> None:
@@ -133,10 +136,10 @@ def _print_capability(capability: Mapping[str, replies.AxisCapability], out: Con
     }
     if with_pure:
         reaches["pure "] = {way: end.pure for way, end in capability.items()}
-    _print_ends(reaches, "wrenches on the rock along the axes of H", out)
-    out.print("least, most: with whatever else the hand can carry")
+    legend = ["least, most: with whatever else the hand can carry"]
     if with_pure:
-        out.print("pure: with every other component zero; -: none")
+        legend.append("pure: with every other component zero; -: none")
+    _print_ends(reaches, "wrenches on the rock along the axes of H", out, legend)
     ends = [capability[f"{sign}{WRENCH_AXES[0]}"].pure for sign in "+-"]
     if any(end is None or round(end, 2) < 0.0 for end in ends):
         out.print("zero is not in this set: with nothing on the wrist a limit would be exceeded")
@@ -242,14 +245,15 @@ def _print_survey_ends(survey: Survey, out: Console) -> None:
         number("reach", "1.reach", ".2f"),
         *(text(part, f"1.limiting.{part}") for part in ("finger", "phalanx", "limit")),
     )
-    print_rows(zip(_names(), survey.ends, strict=True), columns, out)
+    legend = []
     if any(end is None for end in survey.ends):
-        out.print("reach -: no way along the axis was found that holds")
+        legend.append("reach -: no way along the axis was found that holds")
     if any(end is not None and end.limiting is None for end in survey.ends):
-        out.print(
+        legend.append(
             "limit -: no limit binds there; the way ends at a tile dragged backwards, or where the "
             "search stopped",
         )
+    print_rows(zip(_names(), survey.ends, strict=True), columns, out, legend=legend)
 
 
 def print_failures(limiting: Sequence[Row | None], out: Console) -> None:

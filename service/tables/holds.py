@@ -171,7 +171,6 @@ def print_holds(
             number("9 in 10 N", f"1.robust.pure_tenth.{k}", _finite),
             number("share %", f"1.robust.share.{k}", ".0f", scale=100.0),
         ]
-    print_rows(found[:shown], columns, out)
     by: HoldRank = result["sort"]
     force = f"{result['force']:g} N"
     words = {
@@ -181,8 +180,11 @@ def print_holds(
         "pure": f"the largest force along {way} alone",
         "support": f"the largest force along {way} with whatever else",
     }
-    out.print(f"sorted by {words[by]}")
-    out.print("cannot: directions in H, of pull-off and shear, without any force alone")
+    legend = (
+        f"sorted by {words[by]}",
+        "cannot: directions in H, of pull-off and shear, without any force alone",
+    )
+    print_rows(found[:shown], columns, out, legend=legend)
     least = FORCE_TOLERANCE
     alone = sum(each.pure[k] >= least for _, each in found)
     points = len({trial.point for trial in trials})

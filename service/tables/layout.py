@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+
+import click
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
 __all__ = [
+    "VERBOSITY_KEY",
     "PrintedColumn",
     "axis_unit",
     "console",
@@ -22,7 +25,11 @@ __all__ = [
     "print_warnings",
     "short",
     "text",
+    "verbosity",
 ]
+
+VERBOSITY_KEY: Final = "crux.verbosity"
+"""Key of the verbosity in the ``meta`` of a click context: 1 for more output, -1 for less."""
 
 
 def console(stderr: bool = False) -> Console:
@@ -58,6 +65,13 @@ def in_colour(status: str, word: str | None = None) -> Text:
     bad = status in {"overloaded", "infeasible", "failed"}
     colour = "red" if bad else "green" if status == "optimal" else "default"
     return Text(word or status, f"bold {colour}")
+
+
+def verbosity() -> int:
+    """Return the verbosity of the running command: 1 for more output, 0 by default, -1 for less."""
+    context = click.get_current_context(silent=True)
+    level: int = 0 if context is None else context.meta.get(VERBOSITY_KEY, 0)
+    return level
 
 
 def print_warnings(warnings: Iterable[str], out: Console) -> None:
@@ -174,8 +188,10 @@ def print_rows(
     style: Callable[[Any], str] | None = None,
     heads: bool = True,
     padding: int = 1,
+    legend: Sequence[str] = (),
+    result: bool = False,
 ) -> None:
-    """Print a table.
+    """Print a table, unless the verbosity is -1.
 
     Parameters
     ----------
@@ -196,7 +212,15 @@ def print_rows(
     padding : int, optional
         Spaces at both sides of a cell; only at the right if the table is wider than the console and
         has no columns of text.
+    legend : sequence of str, optional
+        Lines below the table that say what it has.
+    result : bool, optional
+        True for a result that has no sentence: with the verbosity -1, each row becomes a line.
     """
+    if verbosity() < 0:
+        if result:
+            _print_lines(rows, list(columns), out)
+        return
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -221,6 +245,15 @@ def print_rows(
     if widest > out.width and not any(column.kind == "text" for column in columns):
         table.padding = (0, padding, 0, 0)
     out.print(table)
+    for line in legend:
+        out.print(line)
+
+
+def _print_lines(rows: Iterable[Any], columns: Sequence[PrintedColumn], out: Console) -> None:
+    """Print a line for each row: heads and cells."""
+    for row in rows:
+        cells = [f"{column.head} {column.cell(row)}".strip() for column in columns]
+        out.print(", ".join(cells), markup=False)
 
 
 def axis_unit(axis: str) -> str:

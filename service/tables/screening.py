@@ -35,9 +35,9 @@ def print_screening(found: Screened, names: Sequence[str], out: Console) -> None
         number("at most", "bound", ".4f"),
         number("utilisation", "utilisation", ".4f"),
     )
-    print_rows(rows[:shown], columns, out)
-    if len(rows) > shown:
-        out.print(f"and {len(rows) - shown} more, whose bounds are lower; --json has all")
+    left = len(rows) - shown
+    legend = [f"and {left} more, whose bounds are lower; --json has all"] if left > 0 else []
+    print_rows(rows[:shown], columns, out, legend=legend)
     solved = f"{found.programs} of {len(names)} stances needed a program"
     out.print(f"{solved}; bounds rest on {found.directions} directions")
     if not len(found.best):

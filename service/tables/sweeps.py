@@ -77,9 +77,9 @@ def _print_points(sweep: Sweep, x: int, out: Console) -> None:
         text("limited by", _limit),
     )
     shown = _thinned(rows)
-    print_rows(shown, columns, out, sweep.design.labels[x])
-    if len(rows) > len(shown):
-        out.print(f"{len(shown)} of {len(rows)} points are shown")
+    left = len(rows) > len(shown)
+    legend = [f"{len(shown)} of {len(rows)} points are shown"] if left else []
+    print_rows(shown, columns, out, sweep.design.labels[x], legend=legend)
 
 
 def _factor(row: SweepRow) -> str | None:
@@ -111,8 +111,8 @@ def _print_held(sweep: Sweep, x: int, y: int, out: Console) -> None:
     if sweep.design.variations[y].numbers:
         values.sort()
     columns = name(_head(sweep, y), word_of), text(f"holds for {sweep.design.labels[x]}", where)
-    print_rows(_thinned(values), columns, out)
-    out.print("between points by interpolation of the utilisation, halfway where there is none")
+    legend = ["between points by interpolation of the utilisation, halfway where there is none"]
+    print_rows(_thinned(values), columns, out, legend=legend)
 
 
 def _interval(held: Held) -> str:

@@ -15,8 +15,8 @@ import planner
 from hand_models.base import CruxError, InvalidInputError
 from service import answering, replies
 from service.requests import PlanRequest
-from service.tables.command_line import VERBOSITY_KEY, ExitStatus, note
-from service.tables.layout import console
+from service.tables.command_line import ExitStatus, note
+from service.tables.layout import console, verbosity
 
 __all__ = [
     "filling_folder",
@@ -25,19 +25,11 @@ __all__ = [
     "say",
     "show",
     "tell_solver",
-    "verbosity",
     "waiting",
     "working",
     "write_plan_picture",
     "writing",
 ]
-
-
-def verbosity() -> int:
-    """Return the verbosity of the running command: 1 for more output, 0 by default, -1 for less."""
-    context = click.get_current_context(silent=True)
-    level: int = 0 if context is None else context.meta.get(VERBOSITY_KEY, 0)
-    return level
 
 
 def remark(message: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from enum import Enum
 from functools import partial
@@ -216,8 +216,8 @@ def decode_request(payload: bytes, kind: type[MessageT], form: Format = Format.J
     return request
 
 
-def _check(value: object, path: str = "") -> None:
-    """Check a decoded request, or a part of it, beyond its types.
+def _check(value: object) -> None:
+    """Check a decoded request, or a part of it, beyond its types; errors have the path from there.
 
     Raises
     ------
@@ -226,25 +226,33 @@ def _check(value: object, path: str = "") -> None:
     UnsupportedError
         If a field has a value that this version does not support.
     """
-    if isinstance(value, float):
-        if not math.isfinite(value):
-            raise InvalidInputError(f"must be a finite number, got {value}", field=path)
-    elif isinstance(value, msgspec.Struct):
+    # most parts first: there are hundreds
+    if value is None or isinstance(value, (str, int)):
+        return
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InvalidInputError(f"must be a finite number, got {value}")
+    for name, part in _parts(value):
+        try:
+            if part is not None and name in LATER_FIELDS and isinstance(value, msgspec.Struct):
+                raise UnsupportedError(f"not supported in this version; {LATER_FIELDS[name]}")
+            _check(part)
+        except InvalidInputError as error:
+            raise error.within(name) from None
+
+
+def _parts(value: object) -> Iterator[tuple[str, object]]:
+    """Yield the parts of a struct, a mapping or a list, with their places in it."""
+    if isinstance(value, msgspec.Struct):
         for name in value.__struct_fields__:
-            part, field = getattr(value, name), f"{path}.{name}" if path else name
-            if name in LATER_FIELDS and part is not None:
-                raise UnsupportedError(
-                    f"not supported in this version; {LATER_FIELDS[name]}", field=field
-                )
             # a mesh's model checks its long lists of numbers as arrays
             if name not in {"vertices", "faces"}:
-                _check(part, field)
-    elif isinstance(value, Mapping):
-        for name, part in value.items():
-            _check(part, f"{path}.{name}" if path else str(name))
+                yield name, getattr(value, name)
     elif isinstance(value, (list, tuple)):
         for i, part in enumerate(value):
-            _check(part, f"{path}[{i}]")
+            yield f"[{i}]", part
+    elif isinstance(value, Mapping):
+        for key, part in value.items():
+            yield str(key), part
 
 
 def most_bytes(kind: type) -> int:

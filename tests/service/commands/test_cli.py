@@ -138,7 +138,8 @@ def test_a_plan_says_how_it_fares_on_displaced_hands(stance_file, capfd):
     run_command_line(["plan", path, "--open-loop", "-q"])
     brief = capfd.readouterr().out
     assert "everything holds in" in brief
-    assert " ".join(row) in " ".join(brief.split())
+    line = f"util 10 % {row[0]}, 50 % {row[1]}, 90 % {row[2]}, dragged N {row[3]}"
+    assert f"{line}, worst hand {row[-1]}" in " ".join(brief.split())
     assert "where limbs are to aim" not in brief
 
 

@@ -31,6 +31,41 @@ from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED
 from tests.suite.helpers.requests import HEAVY, put, wall_request
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["plan", "slab"],
+        ["redundancy", "slab"],
+        ["wrench-space", "slab", "--hand", "front_left", "--opening"],
+        ["body-space", "ledge"],
+        ["body-space", "ledge", "--com"],
+        ["sweep", "slab", "--vary", "load.mass=100,120"],
+        ["study", "fig06"],
+    ],
+    ids=" ".join,
+)
+def test_quiet_commands_print_no_table(words, tmp_path, capfd):
+    """Tables have a rule below their heads, and a command prints some if it is not quiet."""
+    folder = ["-o", str(tmp_path)] if words[0] in ("sweep", "study") else []
+    status = run_command_line([*words, *folder])
+    assert "───" in capfd.readouterr().out
+    assert run_command_line([*words, *folder, "-q"]) == status
+    out = capfd.readouterr().out
+    assert "───" not in out
+    # and the outcome is there
+    assert len(out.split()) > 3
+
+
+@pytest.mark.slow
+def test_a_result_that_has_no_sentence_is_a_line_for_each_row_if_quiet(capfd):
+    for quiet, times in ([], 1), (["-q"], 3):
+        few = ["simulate", "slab", "--draws", "20", "--replanned", "1"]
+        assert run_command_line([*few, *quiet]) == DONE
+        out = capfd.readouterr().out
+        assert out.count("no tile and no palm slips") == times
+        assert ("───" in out) == (not quiet)
+
+
 def completed(*words: str) -> list[str]:
     """Complete the last word as a shell would; what completes to a file is left out."""
     *before, begun = words

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import io
 from types import SimpleNamespace
 
+import click
 import pytest
+from rich.console import Console
 
-from service.tables import console, in_order, name, number, print_rows, text
+from service.tables import (
+    VERBOSITY_KEY,
+    console,
+    in_order,
+    name,
+    number,
+    print_rows,
+    text,
+)
 
 ROWS = [
     ("front_left", SimpleNamespace(distance=0.2714, between=["body", "rock [of a hand]"])),
@@ -52,3 +63,18 @@ def test_a_table_of_numbers_is_narrowed_before_it_is_broken(
 def test_a_row_may_be_bold_and_a_table_without_heads(capsys: pytest.CaptureFixture[str]) -> None:
     print_rows([("a", 1)], in_order(["x"], ["y"]), console(), heads=False, style=lambda _: "bold")
     assert [line.split() for line in printed(capsys) if line] == [["a", "1"]]
+
+
+def test_a_quiet_command_prints_no_table_but_lines_of_a_result() -> None:
+    rows, said = [("all hold", 0.5), ("none", None)], io.StringIO()
+    out = Console(file=said, width=80)
+    columns = (name("simulated", "0"), number("share", "1", ".2f"))
+    with click.Context(click.Command("plan")) as context:
+        context.meta[VERBOSITY_KEY] = -1
+        print_rows(rows, columns, out, "title", legend=["a legend"])
+        assert said.getvalue() == ""
+        print_rows(rows, columns, out, "title", legend=["a legend"], result=True)
+    assert said.getvalue().splitlines() == [
+        "simulated all hold, share 0.50",
+        "simulated none, share -",
+    ]
