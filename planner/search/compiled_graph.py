@@ -236,8 +236,8 @@ def expand(
     -------
     claimed : ndarray of int, shape (c,)
     met : ndarray of int, shape (e, 3)
-        A lift of ``chosen``, a lift that it is joined with and the other end has passed (or any, with
-        side 0), or −1 for the start and −2 for the goal, and the placement on the way.
+        A lift of ``chosen``, a lift that it is joined with and the other end has passed (or any
+        end, with side 0), or −1 for the start and −2 for the goal, and the placement on the way.
     """
     words, limbs, ways = near.shape[1], members.shape[1], len(directions)
     count = len(apart)

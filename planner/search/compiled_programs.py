@@ -47,8 +47,8 @@ def load_factors(
     """Return load factors (N,) of stances, directions (N, 6) that bound them, and supports (N,).
 
     The first six parameters are the attributes of `WorldHands`. A factor is −∞ where no multiple of
-    the body wrench is held, and NaN where the method did not end; a direction is zero then. Supports
-    are the sums of the hands' supports in these directions.
+    the body wrench is held, and NaN where the method did not end; a direction is zero then.
+    Supports are the sums of the hands' supports in these directions.
 
     Parameters
     ----------

@@ -1,50 +1,27 @@
-"""Decide whether a climb has a given least load factor: the lifts around both ends, until they meet.
+"""Decide whether a climb has a given least load factor: from both ends, until they meet.
 
 From the start and from the goal, lifts are reached over four-hand stances that no direction rules
-out. A lift is passed only if its linear program says that it holds enough. Where lifts of both ends
-meet, the stances on the way between them are solved; what fails is taken out, and what hung on it
-is joined anew. If one end has no lift left, no climb has this least load factor.
+out. A lift is passed only if its linear program says that it holds enough. The stances between
+lifts are solved where lifts of both ends meet, or for each lift that is passed. If one end has no
+lift left, no climb has this least load factor.
 """
 
 from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
-from itertools import combinations, count
-from typing import NamedTuple
+from itertools import count
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from planner.search.lifts import Lifts
 from planner.search.programs import Programs
 from planner.search.settings import SEARCH_SETTINGS
 from planner.search.wall import State
+from planner.search.ways import Blocked, Way, Ways
 
-__all__ = ["Blocked", "Decision"]
-
-Blocked = frozenset[tuple[State, State]]
-"""Moves that may not be made: a state and a later one; a state twice may not be passed at all."""
-
-
-Bodies = NDArray[np.bool_]
-
-
-class Way(NamedTuple):
-    """What joins two lifts, or a lift and an end, in the order of the climb.
-
-    Attributes
-    ----------
-    before, after : int
-        Lifts; −1 for the start, −2 for the goal.
-    place : int
-        Placement with which the lift that is not an end has all hands on the rock.
-    """
-
-    before: int
-    after: int
-    place: int
+__all__ = ["Decision"]
 
 
 class Decision:
@@ -72,17 +49,14 @@ class Decision:
         self._least = lifts.multiple * (1.0 - 0.1 * SEARCH_SETTINGS.exact)
         self._factors = np.full(len(lifts), np.nan)
         self._blocked = blocked
-        self._stopped = {first for first, second in blocked if first == second}
-        self.barred = barred or set[Way]()
-        self._bad, self._good = set[State](), set[State]()
+        self._ways = Ways(lifts, programs, blocked, set() if barred is None else barred)
         self._turn = count()
         self._queues = [list[tuple[float, int, Indices]](), list[tuple[float, int, Indices]]()]
-        self.hindered = self.partial = False
-        self.route = self._shift_alone()
+        self.partial = False
+        self.route = self._ways.standing()
         self.exhausted = 0
         self._parents = [self._nodes["out"], self._nodes["parent_1"], self._nodes["parent_2"]]
         self._vias = [self._nodes["out"], self._nodes["via_1"], self._nodes["via_2"]]
-        self._between = dict[Way, list[State]]()
         self._recall()
         for side in (1, 2):
             seeds = lifts.beside(side - 1)
@@ -102,8 +76,18 @@ class Decision:
         return np.unique(np.vstack(both), axis=0)
 
     @property
+    def hindered(self) -> bool:
+        """True if blocked moves left something out, so that the decision proves nothing."""
+        return self._ways.hindered
+
+    @property
+    def barred(self) -> set[Way]:
+        """Ways that blocked moves leave out."""
+        return self._ways.barred
+
+    @property
     def ended(self) -> bool:
-        """Whether it is decided: a route was found, or an end has no lift left."""
+        """True once it is decided: a route was found, or an end has no lift left."""
         return bool(self.route) or self.exhausted > 0
 
     def _recall(self) -> None:
@@ -202,16 +186,14 @@ class Decision:
         if not attempts:
             held, left = left.tolist(), left[:0]
         while len(left) or len(loose):
-            ways = [
-                self._way(side, *row)
-                for row in zip(
-                    parents[left].tolist(), left.tolist(), vias[left].tolist(), strict=True
-                )
-            ]
-            self._solve_stances(ways if attempts else [])
+            columns = (each.tolist() for each in (parents[left], left, vias[left]))
+            ways = [self._way(side, *row) for row in zip(*columns, strict=True)]
+            self._ways.solve(ways if attempts else [])
             failed = loose.tolist()
             for lift, way in zip(left.tolist(), ways, strict=True):
-                fits = way not in self.barred and (not self._attempts or self._states(way))
+                fits = way not in self._ways.barred and (
+                    not self._attempts or self._ways.states(way)
+                )
                 (held if fits else failed).append(lift)
             new = [lift for lift in failed if lift not in others]
             if new:
@@ -230,7 +212,7 @@ class Decision:
                 break
             for lift in failed:
                 for parent, place in others[lift]:
-                    if not self._bad_ends(self._way(side, parent, lift, place)):
+                    if not self._ways.fails(self._way(side, parent, lift, place)):
                         parents[lift], vias[lift] = parent, place
                         again.append(lift)
                         break
@@ -239,139 +221,17 @@ class Decision:
             left, loose = np.array(again, dtype=np.intp), loose[:0]
         return np.unique(np.array(held, dtype=np.intp))
 
-    def _ends_of(self, way: Way) -> list[State]:
-        """Return the first and the last stance of a shift between two lifts."""
-        members, bodies = self._stance(way), self._lifts.bodies
-        both = {int(bodies[lift]) for lift in (way.before, way.after) if lift >= 0}
-        return [State(body, members) for body in both]
-
-    def _bad_ends(self, way: Way) -> bool:
-        return way in self.barred or not self._bad.isdisjoint(self._ends_of(way))
-
-    def _solve_stances(self, ways: list[Way]) -> None:
-        """Solve the stances at the ends of shifts together, and take over what their bounds say."""
-        left = {state for way in ways for state in self._ends_of(way)}
-        while left := {each for each in left if each not in self._bad and each not in self._good}:
-            # one body of each first: its direction may rule out the others
-            some = list({each.members: each for each in sorted(left)}.values())
-            bodies, members = (np.array(column) for column in zip(*some, strict=True))
-            factors = self._programs.stances(some)
-            low = factors < self._least
-            self._good.update(each for each, fails in zip(some, low, strict=True) if not fails)
-            self._bad.update(each for each, fails in zip(some, low, strict=True) if fails)
-            self._bad.update(
-                self._lifts.ruled_out(members[low], *self._programs.bounding(some, low))
-            )
-
-    # ways
-
     def _way(self, side: int, parent: int, lift: int, place: int) -> Way:
         if side == 1:
             return Way(parent, lift, place)
         return Way(lift, parent, place)
-
-    def _stance(self, way: Way) -> tuple[int, ...]:
-        lift = way.before if way.before >= 0 else way.after
-        if (
-            way.before >= 0
-            and way.after >= 0
-            and self._lifts.triples[way.before] != (self._lifts.triples[way.after])
-        ):
-            pair = self._lifts.members[self._lifts.triples[[way.before, way.after]]]
-            return tuple(pair.max(axis=0).tolist())
-        row = self._lifts.members[self._lifts.triples[lift]]
-        return tuple(np.where(row < 0, way.place, row).tolist())
-
-    def _span(self, way: Way) -> tuple[Bodies, Bodies]:
-        """Return where the body may be before and after the shift between two lifts, (B,) each."""
-        ends, count = self._lifts.ground.ends, len(self._lifts.ground.wall.bodies)
-        before, after = (
-            ends[-1 - lift].bodies if lift < 0 else np.arange(count) == self._lifts.bodies[lift]
-            for lift in (way.before, way.after)
-        )
-        return before, after
-
-    def _shift(self, members: tuple[int, ...], starts: Bodies, goals: Bodies) -> list[int]:
-        """Return the bodies of the shortest shift on four hands, past stances that fail."""
-        ground = self._lifts.ground
-        allowed = np.ones(len(ground.wall.bodies), dtype=bool)
-        for limb, p in enumerate(members):
-            allowed &= ground.reached[p, :, limb]
-        for body in np.flatnonzero(allowed).tolist():
-            state = State(body, members)
-            self.hindered |= state in self._stopped
-            allowed[body] = state not in self._bad and state not in self._stopped
-        back = dict[int, int]()
-        front = np.flatnonzero(starts & allowed).tolist()
-        seen = starts & allowed
-        for body in front:
-            back[body] = -1
-        while front:
-            ahead = list[int]()
-            for body in front:
-                if goals[body]:
-                    path = [body]
-                    while back[path[-1]] >= 0:
-                        path.append(back[path[-1]])
-                    return path[::-1]
-                for other in np.flatnonzero(ground.beside[body] & allowed & ~seen).tolist():
-                    if (State(body, members), State(other, members)) in self._blocked:
-                        self.hindered = True
-                        continue
-                    seen[other] = True
-                    back[other] = body
-                    ahead.append(other)
-            front = ahead
-        return []
-
-    def _states(self, way: Way) -> list[State]:
-        """Return the four-hand states between two lifts, all of which hold enough; [] if none."""
-        if way not in self._between:
-            self._between[way] = self._held(self._stance(way), *self._span(way))
-        return self._between[way]
-
-    def _held(self, members: tuple[int, ...], starts: Bodies, goals: Bodies) -> list[State]:
-        """Return the states of the shortest shift that hold enough; [] if none do."""
-        while True:
-            states = [State(body, members) for body in self._shift(members, starts, goals)]
-            low = [each for each in states if self._programs.stance(each) < self._least]
-            if not low:
-                return states
-            self._bad.update(low)
-
-    def _shift_alone(self) -> tuple[State, ...]:
-        """Return a climb that only shifts the body, if there is one."""
-        ground, table = self._lifts.ground, self._lifts.table
-        starts, goals = (np.asarray(end.bodies, dtype=bool) for end in ground.ends)
-        both = ground.reached[:, goals].any(axis=1)
-        for body in np.flatnonzero(starts).tolist():
-            own = list[Indices]()
-            for limb, column in enumerate(both.T):
-                fits = ground.of(body, limb)[column[ground.of(body, limb)]]
-                for fixed in ground.fixed[:, limb]:
-                    fits = fits[(fixed < 0) | (fits == fixed)]
-                own.append(fits)
-            rows = table.passing(body, own, self.multiple)
-            for i, j in combinations(range(len(own)), 2):
-                rows = rows[ground.wall.apart[rows[:, i], rows[:, j]]]
-            only = np.arange(len(starts)) == body
-            for members in map(tuple, rows.tolist()):
-                if states := self._held(members, only, goals):
-                    return tuple(states)
-        return ()
-
-    def _state(self, lift: int) -> State:
-        row = self._lifts.members[self._lifts.triples[lift]]
-        return State(int(self._lifts.bodies[lift]), tuple(row.tolist()))
-
-    # where both ends meet
 
     def _meet(self, side: int, i: int, j: int, place: int) -> bool:
         """Try the climb over a lift that one end has passed, and one that the other has."""
         if j >= 0 and self._nodes["closed"][j] != 3 - side:
             return False
         middle = Way(i, j, place) if side == 1 else Way(j, i, place)
-        if middle in self.barred or not self._states(middle):
+        if middle in self._ways.barred or not self._ways.states(middle):
             return False
         first, last = (i, j) if side == 1 else (j, i)
         ways = [*reversed(list(self._chain(1, first))), middle, *self._chain(2, last)]
@@ -390,18 +250,18 @@ class Decision:
         """Return the first way that fails; None, and the climb is kept, if all hold."""
         states = list[State]()
         for way in ways:
-            between = self._states(way) if way not in self.barred else []
+            between = self._ways.states(way) if way not in self._ways.barred else []
             if not between:
                 return way
             if way.before >= 0:
-                lift = self._state(way.before)
+                lift = self._ways.state(way.before)
                 turns = [(lift, between[0]), (states[-2], lift), (states[-2], between[0])]
-                if lift in self._stopped or any(turn in self._blocked for turn in turns):
+                if lift in self._ways.stopped or any(turn in self._blocked for turn in turns):
                     self._bar(way)
                     return way
             states += between
             if way.after >= 0:
-                after = self._state(way.after)
+                after = self._ways.state(way.after)
                 if (between[-1], after) in self._blocked:
                     self._bar(way)
                     return way
@@ -410,5 +270,5 @@ class Decision:
         return None
 
     def _bar(self, way: Way) -> None:
-        self.barred.add(way)
-        self.hindered = True
+        self._ways.barred.add(way)
+        self._ways.hindered = True

@@ -23,7 +23,7 @@ __all__ = ["Ground", "Lifts"]
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """What a wall allows whatever the hands hold: reach, shifts, and the ends of climbs.
+    """Reach, shifts and ends of climbs of a wall, whatever its hands hold.
 
     Attributes
     ----------
@@ -97,7 +97,9 @@ class Ground:
     def far(self) -> Array:
         """Mean of the `hops` of the bodies from which limbs reach placements, (2, P, L)."""
         count = np.maximum(self.reached.sum(axis=1), 1)
-        return np.einsum("pbl,eb->epl", self.reached.astype(float), self.hops) / count
+        found: Array = np.einsum("pbl,eb->epl", self.reached.astype(float), self.hops)
+        found /= count
+        return found
 
     def of(self, body: int, limb: int) -> Indices:
         """Return the placements that a limb reaches from a body."""
@@ -316,7 +318,8 @@ class Lifts:
         far = np.zeros(len(lifts))
         for limb, column in enumerate(rows.T):
             far += np.where(column >= 0, ground.far[end, column, limb], 0.0)
-        return far + ground.hops[end, self.bodies[lifts]]
+        far += ground.hops[end, self.bodies[lifts]]
+        return far
 
     @cached_property
     def _hashed(self) -> tuple[Indices, Indices]:

@@ -13,10 +13,10 @@ from planner.screening import ScreeningTable, StanceIndices, solve_stance
 from planner.search.settings import SEARCH_SETTINGS
 from planner.search.wall import State
 
-__all__ = ["Programs", "Solved"]
+__all__ = ["Programs", "SolvedStates"]
 
 
-class Solved(NamedTuple):
+class SolvedStates(NamedTuple):
     """Load factors of N stances, with the directions that bound them.
 
     Attributes
@@ -37,10 +37,16 @@ class Solved(NamedTuple):
     directions: Array
     held: Array
 
-    def below(self, multiple: float) -> Solved:
+    def below(self, multiple: float) -> SolvedStates:
         """Return those with a smaller load factor."""
         kept = self.factors < multiple
-        return Solved(*(column[kept] for column in self))
+        return SolvedStates(
+            self.bodies[kept],
+            self.members[kept],
+            self.factors[kept],
+            self.directions[kept],
+            self.held[kept],
+        )
 
 
 class Programs:
@@ -54,11 +60,11 @@ class Programs:
 
     def __init__(self, table: ScreeningTable) -> None:
         self._table = table
-        self._parts = list[Solved]()
+        self._parts = list[SolvedStates]()
         self._stances = dict[State, tuple[float, Array, float]]()
         self.count = 0
 
-    def solve(self, bodies: Indices, members: Indices) -> Solved:
+    def solve(self, bodies: Indices, members: Indices) -> SolvedStates:
         """Return the load factors of states, which are kept."""
         from planner.search.compiled_programs import load_factors
 
@@ -85,7 +91,7 @@ class Programs:
             held[i] = hands.supports(answer.direction[None])[members[i][members[i] >= 0]].sum()
             factors[i] = -np.inf if np.isnan(answer.factor) else answer.factor
         self.count += len(bodies)
-        found = Solved(bodies, members, factors, directions, held)
+        found = SolvedStates(bodies, members, factors, directions, held)
         self._parts.append(found)
         return found
 
@@ -110,19 +116,17 @@ class Programs:
         return directions, np.array([row[2] for row in rows])
 
     @property
-    def known(self) -> Solved:
+    def known(self) -> SolvedStates:
         """All that was solved."""
         if len(self._parts) != 1:
             limbs = self._table.moments.shape[1] or 4
-            none = Solved(
+            none = SolvedStates(
                 np.zeros(0, dtype=np.intp),
                 np.zeros((0, limbs), dtype=np.intp),
                 np.zeros(0),
                 np.zeros((0, 6)),
                 np.zeros(0),
             )
-            whole = [
-                np.concatenate(columns) for columns in zip(*(self._parts or [none]), strict=True)
-            ]
-            self._parts = [Solved(*whole)]
+            parts = self._parts or [none]
+            self._parts = [SolvedStates(*map(np.concatenate, zip(*parts, strict=True)))]
         return self._parts[0]

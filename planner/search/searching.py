@@ -7,17 +7,18 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, go_on
+from hand_models.base import Array, InvalidInputError, LimitError, go_on
 from planner import deadline
 from planner.deadline import DeadlineError
 from planner.screening import ScreeningTable, StanceIndices, solve_stance
-from planner.search.deciding import Blocked, Decision
+from planner.search.deciding import Decision
 from planner.search.found import Found, Proof
 from planner.search.learning import learnt, some_lifts
 from planner.search.lifts import Ground, Lifts
 from planner.search.programs import Programs
 from planner.search.settings import SEARCH_SETTINGS
 from planner.search.wall import Ends, State, Wall
+from planner.search.ways import Blocked
 
 __all__ = ["SearchProgress", "search"]
 
@@ -94,6 +95,7 @@ class _Search:
         self._proof: Proof | None = None
         self._lifts = self._relearnt = 0
         bodies, limbs = wall.reach.entry.shape[1:]
+        self._doubt, self._failures = np.inf, 0
         self._levels = np.full((bodies, limbs), -np.inf)
         self._ceiling = self._tried = np.inf
 
@@ -108,38 +110,73 @@ class _Search:
         """Search until the climb is as good as asked for, or proven to be the best."""
         settings = SEARCH_SETTINGS
         self._learn()
-        if at_least is not None:
-            self._ceiling = np.inf
         while True:
             best = max(self._least, 0.0)
             enough = at_least is not None and self._least >= at_least * (1.0 - settings.exact)
             if enough or self._ceiling <= best * (1.0 + within) * (1.0 + 2.0 * settings.exact):
                 return True
-            decided = self._decide(self._next(at_least))
-            if decided.route:
-                self._states = decided.route
-                self._least = min(self._programs.stance(state) for state in decided.route)
-            elif decided.exhausted:
-                multiple = decided.multiple if decided.multiple > 0.0 else -np.inf
-                # below the least load factor that is asked for, nothing counts
-                if not decided.partial:
-                    self._ceiling = -np.inf if multiple == at_least else multiple
-                    if not decided.hindered:
-                        self._prove(decided, multiple)
+            if at_least is not None:
+                decided = self._enough(at_least)
+            elif self._states:
+                try:
+                    decided = self._better()
+                except LimitError:
+                    # too many lifts for a lower bound: what is known stands
+                    return False
+            else:
+                decided = self._decide(self._lower())
+            self._note(decided, at_least)
 
-    def _next(self, at_least: float | None) -> float:
-        """Return the least load factor that is tried next."""
+    def _note(self, decided: Decision, at_least: float | None) -> None:
+        """Take over what a decision has found or proven."""
+        multiple = decided.multiple if decided.multiple > 0.0 else -np.inf
+        if decided.route:
+            self._states = decided.route
+            self._least = min(self._programs.stance(state) for state in decided.route)
+        elif decided.exhausted and decided.partial:
+            self._doubt = multiple
+        elif decided.exhausted:
+            # below the least load factor that is asked for, nothing counts
+            self._ceiling = -np.inf if multiple == at_least else multiple
+            if not decided.hindered:
+                self._prove(decided, multiple)
+        if self._states and (decided.route or (decided.exhausted and not decided.partial)):
+            self._failures = 0
+
+    def _lower(self) -> float:
+        """Return the least load factor that is tried before any climb is known."""
         settings = SEARCH_SETTINGS
-        if at_least is not None:
-            return at_least
-        if not self._states:
-            below = self._tried < self._ceiling
-            multiple = min(settings.step * self._ceiling, self._tried)
-            multiple *= settings.first_step if below else 1.0
-            return multiple if multiple > settings.lowest else 0.0
-        if self._ceiling < self._least * (1.0 + settings.ratchet):
-            return self._least * (1.0 + settings.exact)
-        return float(np.sqrt(self._least * self._ceiling))
+        below = self._tried < self._ceiling
+        multiple = min(settings.step * self._ceiling, self._tried)
+        multiple *= settings.first_step if below else 1.0
+        return multiple if multiple > settings.lowest else 0.0
+
+    def _enough(self, at_least: float) -> Decision:
+        """Look for a climb with a given least load factor, from larger ones down to it."""
+        multiple = self._lower()
+        if multiple > at_least:
+            return self._decide(multiple)
+        self._failures += 1
+        if np.isfinite(self._levels).any() and self._failures == 1:
+            return self._run(at_least, self._levels, SEARCH_SETTINGS.better_steps)
+        return self._run(at_least, None, np.inf)
+
+    def _better(self) -> Decision:
+        """Look for a better climb, or for a lower bound, whatever is likely to be cheap."""
+        ratio, settings = self._ceiling / self._least, SEARCH_SETTINGS
+        if ratio < 1.0 + settings.ratchet:
+            return self._run(self._least * (1.0 + settings.exact), None, np.inf)
+        self._failures += 1
+        if not np.isfinite(self._levels).any() or self._failures > 2:
+            self._failures = 0
+            return self._run(self._least * ratio**0.5, None, np.inf)
+        if self._failures == 1 and not self._least < self._doubt < self._ceiling:
+            multiple = self._least * ratio ** (1.0 / 3.0)
+            return self._run(multiple, self._levels, settings.better_steps)
+        multiple = min(self._least * ratio ** (2.0 / 3.0), self._ceiling)
+        if self._least < self._doubt < self._ceiling:
+            multiple, self._doubt = self._doubt, np.inf
+        return self._run(multiple, None, np.inf, whole=False)
 
     def _check(self) -> None:
         """Break the search off when time is over, and say now and then how far it is."""
@@ -175,23 +212,23 @@ class _Search:
         Before the first climb is known, it is also left open after some steps, for a lower one.
         """
         self._tried = multiple
-        steps = np.inf if self._states or multiple == 0.0 else SEARCH_SETTINGS.first_steps
-        if np.isfinite(self._levels).any():
-            # a part of the lifts first: where there are many, those that look best
-            decision = self._run(multiple, self._levels, steps)
-            if decision.route or (not self._states and multiple > 0.0):
-                return decision
-        return self._run(multiple, None, steps)
+        few = np.isfinite(self._levels).any() and multiple > 0.0
+        return self._run(multiple, self._levels if few else None, SEARCH_SETTINGS.first_steps)
 
-    def _run(self, multiple: float, levels: Array | None, steps: float) -> Decision:
-        """Look for a climb among all lifts, or among those that pass at higher levels."""
+    def _run(
+        self, multiple: float, levels: Array | None, steps: float, whole: bool = True
+    ) -> Decision:
+        """Look for a climb among all lifts, or among those that pass at higher levels.
+
+        Without ``whole``, it is left open whether there is one if stances fail on its way.
+        """
         self._report(f"lifts at {multiple:.3g}")
         stances = self._stance_table(multiple)
         lifts = Lifts.passing(self._ground, self._table, multiple, levels, stances, self._check)
         self._lifts = len(lifts)
         many = lifts.counts > SEARCH_SETTINGS.many
         self._levels[many] = np.maximum(self._levels[many], multiple)
-        # all lifts: stances are solved where both ends meet, and on all ways only if some fail there
+        # of all lifts, stances are solved where both ends meet, and all only if some fail there
         attempts = 0.0 if levels is None else float(SEARCH_SETTINGS.attempts)
         self._report(f"climbs at {multiple:.3g}")
         decision = Decision(lifts, self._programs, self._blocked, attempts)
@@ -199,12 +236,13 @@ class _Search:
             self._check()
             decision.advance()
             steps -= 1
+            if decision.stuck and not whole:
+                break
             if decision.stuck:
                 lifts.nodes[:] = 0
                 attempts = np.inf if levels is None else attempts
                 barred = decision.barred
                 decision = Decision(lifts, self._programs, self._blocked, attempts, barred)
-                decision.hindered = len(barred) > 0
         decision.partial = levels is not None
         self._relearn(multiple)
         return decision

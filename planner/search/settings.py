@@ -27,7 +27,7 @@ class SearchSettings:
     """Part of a multiple that was too much, which is tried next."""
     lowest: float = 0.1
     """Multiple below which the next that is tried is zero."""
-    many: int = 500
+    many: int = 300
     """Lifts of a body and a limb in the air from which on only the best are kept at first."""
     silence: float = 1.0
     """Time between two reports of progress [s]."""
@@ -41,7 +41,9 @@ class SearchSettings:
     """Directions that are taken: those that rule out most."""
     first_step: float = 0.85
     """Part of a multiple that was left open, which is tried next."""
-    first_steps: int = 250
+    better_steps: int = 300
+    """Steps for a better climb among the best lifts."""
+    first_steps: int = 120
     """Steps for one multiple, of ``at_once`` lifts each, before the first climb is known."""
     ratchet: float = 1e-3
     """Gap below which only climbs better than the best known are looked for."""

@@ -1,4 +1,4 @@
-"""What a climb is searched on: placements of hands, poses of the body, and where it has to lead."""
+"""A wall for the search: placements of hands, poses of the body, and the ends of climbs."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Wall:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ends:
-    """Where a climb may begin, or has to end: with all hands on the rock.
+    """Stances at which a climb may begin, or has to end, with all hands on the rock.
 
     Attributes
     ----------

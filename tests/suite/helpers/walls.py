@@ -1,6 +1,7 @@
 """Random walls of closed hands, and their load factors by another solver."""
 
 from functools import cache
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -132,7 +133,7 @@ def climbing_wall(
     near &= (np.abs(grid[:, None] - grid[None]) > 1e-6).sum(axis=2) == 1
     return search.Wall(
         robot=robosimian(),
-        places=(),
+        places=tuple(SimpleNamespace(pose=pose) for pose in poses),
         bodies=tuple(Pose(wall.lean @ place, wall.lean) for place in grid),
         shifts=np.argwhere(np.triu(near)),
         reach=reach,
