@@ -290,7 +290,8 @@ def _all_of(filters: Sequence[Fits]) -> Fits:
         found = np.ones(len(angles), dtype=bool)
         for each in filters:
             left = np.flatnonzero(found)
-            found[left] = each(angles[left], owners[left])
+            if len(left):
+                found[left] = each(angles[left], owners[left])
         return found
 
     return fits
@@ -302,8 +303,9 @@ def _clear_of_rock(scene: CollisionScene, limb: str, rock: Rock, bodies: Sequenc
     # the last joint moves the hand and what is next to it, which may touch
     free = np.flatnonzero(capsules.steps < capsules.steps.max())
     along = np.linspace(0.0, 1.0, 5)[:, None]
-    far = 0.5  # that a link is in the rock at most [m]
     margin = scene_number("motion", "margin_at_hold")
+    # a limb that is deeper in the rock somewhere goes through its surface elsewhere
+    far = 2.0 * float((scene.radii[own[free]] + margin).max())
     into = [rock.pose.inverse() @ body for body in bodies]
     turns, origins = (
         np.array([at.rotation for at in into]),

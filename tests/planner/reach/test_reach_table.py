@@ -110,7 +110,7 @@ def test_reaches_the_poses_of_random_postures():
     again = np.repeat(targets, count, axis=0)
     np.testing.assert_allclose(chain.frames(angles), again, atol=1e-7)
     # only those that fit are returned, and further ones are searched where none does
-    some, fewer = reach_poses(chain, Starts(chain), targets[:200], 3, lambda q: q[:, 0] > 0.0)
+    some, fewer = reach_poses(chain, Starts(chain), targets[:200], 3, lambda q, _: q[:, 0] > 0.0)
     assert (some[:, 0] > 0.0).all()
     assert (fewer <= 3).all()
     first = np.cumsum(count[:200]) - count[:200]

@@ -17,6 +17,7 @@ from hand_models.fixed_wrist import wrench_spaces
 from hand_models.rock import Cylinder, Mesh
 from hand_models.tile import Surface
 from planner import deadline
+from planner.motion import Rock
 from planner.prepare import settle_each
 from planner.programs import WRENCH_UNIT
 from planner.reach import reach_table
@@ -35,8 +36,9 @@ def test_every_trial_is_counted():
 
 
 def test_reach_in_chunks_is_reach_at_once():
-    wall = tiny_wall().wall
-    whole = reach_table(wall.robot, [place.pose for place in wall.places], wall.bodies)
+    wall, source = tiny_wall().wall, tiny_source()
+    rock = Rock("rock", source.rock, source.rock_pose, frozenset(wall.robot.limbs))
+    whole = reach_table(wall.robot, [place.pose for place in wall.places], wall.bodies, rock=rock)
     assert 0 < whole.reached.sum() < whole.reached.size
     for name, value in vars(whole).items():
         np.testing.assert_array_equal(getattr(wall.reach, name), value)
