@@ -187,7 +187,7 @@ class _Graph:
         Σ σ(d) ≥ s d·w for each direction d: the multiples s end where d·w > 0, and begin where
         d·w < 0.
         """
-        settings, c, size = CERTIFICATION_SETTINGS, self.of, CERTIFICATION_SETTINGS.block
+        settings, c, size = CERTIFICATION_SETTINGS, self.of, CERTIFICATION_SETTINGS.compared
         if len(states) > size:
             blocks = [self.held(states[i : i + size]) for i in range(0, len(states), size)]
             return np.concatenate(blocks)
