@@ -9,10 +9,10 @@ path; and it is *loaded* as the plan of the new stance has it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from itertools import pairwise, takewhile
+from itertools import takewhile
 
 import numpy as np
 from msgspec import structs
@@ -21,17 +21,13 @@ from hand_models.base import Array, Pose
 from planner.deadline import DeadlineError
 from planner.motion import (
     BranchEndError,
-    NearestPair,
     NoWayError,
-    check_shift,
-    met_in_shift,
-    pose_between,
     shift_postures,
 )
 from planner.prepare import posture
 from planner.programs import CAP_SLACK
 from planner.question import HandOnHold, Objective
-from planner.robots import UnreachableError, scene_number, solve_limbs
+from planner.robots import UnreachableError, solve_limbs
 from planner.route.between import Passage
 from planner.route.branch_choice import KnownBranches, ends_of_swing, start_joints, swing_to
 from planner.route.climb import Move, Route, stages
@@ -44,7 +40,13 @@ from planner.route.held import (
     hold_with,
 )
 from planner.route.knots import Climb, Failure, Knot, KnotPhase
-from planner.route.moving import closing_loads, closing_states, in_air, opening_states
+from planner.route.moving import (
+    closing_loads,
+    closing_states,
+    in_air,
+    opening_states,
+    shift_of_body,
+)
 from planner.route.moving_hand import MovingHand
 from planner.route.settings import ClimbSettings, KnotNumbers
 from planner.solving import Solution
@@ -116,11 +118,6 @@ class _BlockedError(Exception):
     def __init__(self, failure: Failure) -> None:
         super().__init__(failure.reason)
         self.failure = failure
-
-
-def _in_the_way(met: NearestPair) -> NoPlanError:
-    """Return the error of a shift in which something is met."""
-    return NoPlanError(f"while the body shifts, {met}; shift the body less or elsewhere")
 
 
 class _Planner:
@@ -207,45 +204,12 @@ class _Planner:
 
     def _shift(self, goal: Pose) -> None:
         """Shift the body on all hands."""
-        first, numbers = self._at.posed, self._numbers
-        robot, hands = self._route.start.robot, {each.limb: each.pose for each in first.hands}
-        for halvings in range(numbers.halvings + 1):
-            count = 2**halvings
-            parts = [k / count for k in range(1, count)]
-            bodies = [*(pose_between(first.body, goal, part) for part in parts), goal]
-            found = self._followed(hands, bodies)
-            ways = {limb: np.vstack([first.angles[limb], each]) for limb, each in found.items()}
-            halfway = [pose_between(a, b, 0.5) for a, b in pairwise([first.body, *bodies])]
-            middle = {limb: 0.5 * (way[1:] + way[:-1]) for limb, way in ways.items()}
-            off = 0.0
-            for k, body in enumerate(halfway):
-                there = robot.hand_poses({limb: each[k] for limb, each in middle.items()})
-                away = [body.apply(there[limb].position) - hands[limb].position for limb in ways]
-                off = max(off, float(np.linalg.norm(away, axis=1).max()))
-            if off <= numbers.slack:
-                break
-        margin = scene_number("motion", "margin_at_hold")
-        seen = check_shift(self._scene, [first.body, *bodies], ways, margin=margin)
-        if not seen.clear:
-            raise _in_the_way(seen.nearest)
+        first = self._at.posed
+        bodies, ways = shift_of_body(first, goal, self._scene, self._numbers)
         for k, body in enumerate(bodies, start=1):
             angles = {**first.angles, **{limb: way[k] for limb, way in ways.items()}}
             stage = body is goal
             self._go(self._plan(replace(first, body=body, angles=angles), stage=stage), stage=stage)
-
-    def _followed(self, hands: Mapping[str, Pose], bodies: Sequence[Pose]) -> dict[str, Array]:
-        """Return joint angles of a shift; what is met is said before a limb that cannot follow."""
-        posed = self._at.posed
-        try:
-            return shift_postures(self._route.start.robot, hands, bodies, posed.angles)
-        except BranchEndError as error:
-            margin = scene_number("motion", "margin_at_hold")
-            met = met_in_shift(
-                self._scene, hands, posed.body, bodies[-1], posed.angles, margin=margin
-            )
-            if met is None:
-                raise
-            raise _in_the_way(met) from error
 
     def _unload(self, limb: str) -> list[MovingHand]:
         """Take the load off the leaving hand; return its states while it opens."""

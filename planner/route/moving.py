@@ -1,22 +1,34 @@
-"""The hand that leaves its hold, or comes to a new one: its states along its opening path."""
+"""What moves in a climb: a hand along its opening path, and the body on all hands."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
-from hand_models.base import Array
+from hand_models.base import Array, Pose
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.opening import HandPath, closing_path, opening_path
 from hand_models.wrench_spaces import WrenchSpace
 from planner.explanation import limit_name
+from planner.motion import (
+    BranchEndError,
+    CollisionScene,
+    NearestPair,
+    check_shift,
+    met_in_shift,
+    pose_between,
+    shift_postures,
+)
 from planner.prepare import FORCE_CAP
-from planner.route.held import NoPlanError
+from planner.robots import scene_number
+from planner.route.held import NoPlanError, Posed
 from planner.route.moving_hand import MovingHand
+from planner.route.settings import KnotNumbers
 
-__all__ = ["closing_loads", "closing_states", "in_air", "opening_states"]
+__all__ = ["closing_loads", "closing_states", "in_air", "opening_states", "shift_of_body"]
 
 
 def closing_loads(settled: SettledHand, space: WrenchSpace) -> Array:
@@ -118,3 +130,61 @@ def _winch_angles(settled: SettledHand, path: HandPath, *, opens: bool) -> Array
     joints = path.joints @ np.array(model.finger.pulley_radii)
     nails = model.nail.pulley_radius * np.asarray(settled.nail_angles)
     return np.asarray(model.drive.winch_angle(joints, f, drawn, losses, nails))
+
+
+def shift_of_body(
+    first: Posed, goal: Pose, scene: CollisionScene, numbers: KnotNumbers
+) -> tuple[list[Pose], dict[str, Array]]:
+    """Return the way of a body on all hands: poses of B in W, and joint angles before and at each.
+
+    There are so many poses that interpolated joints keep each hand on its hold.
+
+    Parameters
+    ----------
+    first : Posed
+        Before the shift.
+    goal : Pose
+        Pose of B in W, which is the last one.
+    scene : CollisionScene
+    numbers : KnotNumbers
+
+    Raises
+    ------
+    NoPlanError
+        If a link meets something.
+    BranchEndError
+        If a limb cannot follow.
+    """
+    robot, hands = first.route.start.robot, {each.limb: each.pose for each in first.hands}
+    margin = scene_number("motion", "margin_at_hold")
+    for halvings in range(numbers.halvings + 1):
+        count = 2**halvings
+        parts = [k / count for k in range(1, count)]
+        bodies = [*(pose_between(first.body, goal, part) for part in parts), goal]
+        try:
+            found = shift_postures(robot, hands, bodies, first.angles)
+        except BranchEndError as error:
+            # what is met is said before a limb that cannot follow
+            met = met_in_shift(scene, hands, first.body, goal, first.angles, margin=margin)
+            if met is None:
+                raise
+            raise _in_the_way(met) from error
+        ways = {limb: np.vstack([first.angles[limb], each]) for limb, each in found.items()}
+        halfway = [pose_between(a, b, 0.5) for a, b in pairwise([first.body, *bodies])]
+        middle = {limb: 0.5 * (way[1:] + way[:-1]) for limb, way in ways.items()}
+        off = 0.0
+        for k, body in enumerate(halfway):
+            there = robot.hand_poses({limb: each[k] for limb, each in middle.items()})
+            away = [body.apply(there[limb].position) - hands[limb].position for limb in ways]
+            off = max(off, float(np.linalg.norm(away, axis=1).max()))
+        if off <= numbers.slack:
+            break
+    seen = check_shift(scene, [first.body, *bodies], ways, margin=margin)
+    if not seen.clear:
+        raise _in_the_way(seen.nearest)
+    return bodies, ways
+
+
+def _in_the_way(met: NearestPair) -> NoPlanError:
+    """Return the error of a shift in which something is met."""
+    return NoPlanError(f"while the body shifts, {met}; shift the body less or elsewhere")

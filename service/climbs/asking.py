@@ -35,7 +35,7 @@ class Sought(NamedTuple):
         self, rock: Path, read: Callable[[str], requests.PlanRequest]
     ) -> requests.ClimbRequest:
         """Return the request for a climb on a rock; ``read`` reads a stance of a name."""
-        places = {} if self.spacing is None else {"spacing": self.spacing}
+        places: dict[str, Any] = {} if self.spacing is None else {"spacing": self.spacing}
         bodies: dict[str, Any] = {}
         if self.body_spacing is not None:
             bodies["spacing"] = self.body_spacing
@@ -63,8 +63,8 @@ def demo_request() -> requests.ClimbRequest:
         name="small-wall",
         rock="small-wall",
         start=requests.ClimbEnd(height=0.75),
-        goal=requests.ClimbEnd(height=1.0),
-        places=PlaceGrid(spacing=0.18),
+        goal=requests.ClimbEnd(height=1.05),
+        places=PlaceGrid(spacing=0.16),
         bodies=BodyGrid(stand_offs=(0.6, 0.7)),
         best_within=0.3,
         time=240.0,

@@ -13,12 +13,7 @@ import click
 import msgspec
 
 import planner
-from hand_models.base import (
-    CruxError,
-    InvalidInputError,
-    UnsupportedError,
-    to_install,
-)
+from hand_models.base import CruxError, InvalidInputError, UnsupportedError, to_install
 from service import answering, bulk, climbs, requests, tables, wire
 from service.commands import options, stances
 from service.commands.batch import answer_rest, complain, exit_status, new_run
@@ -163,9 +158,8 @@ def climb_command(
     Exit status: 0 with a climb, 3 if it is proven that there is none or no moves have a plan, 1 if
     none was found in time.
     """
-    return search_climb(
-        own.asked(sought.request(rock, stances.read_request)), folder, parallel, own, as_json
-    )
+    asked = own.asked(sought.request(rock, stances.read_request))
+    return search_climb(asked, folder, parallel, own, as_json)
 
 
 def search_climb(
