@@ -20,7 +20,7 @@ from msgspec.structs import replace
 
 from service import CruxClient
 from service.replies import HealthReply, PartReply
-from service.requests import ClimbRequest
+from service.requests import ClimbRequest, PlanRequest
 from service.serving import PlanService, open_session, zenoh_config
 from service.wire import ServiceError, service_key
 from tests.suite.helpers.checkout import ROOT
@@ -148,7 +148,7 @@ def test_any_zenoh_program_sees_the_progress_as_replies(site: Site) -> None:
 @pytest.mark.skipif(not hasattr(os, "getpriority"), reason="no niceness on this system")
 def test_a_climb_keeps_no_plan_waiting_and_yields_to_it(site: Site) -> None:
     client, other = site.client(), site.client()
-    request = msgspec.convert(wall_request(), type=_plan_request())
+    request = msgspec.convert(wall_request(), type=PlanRequest)
     with climb_in_work(site, client, "long"):
         assert all(other.plan(request).status == "optimal" for _ in range(3))
         # also of the client that climbs
@@ -161,12 +161,6 @@ def test_a_climb_keeps_no_plan_waiting_and_yields_to_it(site: Site) -> None:
         least = os.getpriority(os.PRIO_PROCESS, 0)
         assert nice["climbs"] == max(10, least)
         assert {nice["questions"], nice["streams"]} == {least}
-
-
-def _plan_request() -> type:
-    from service.requests import PlanRequest
-
-    return PlanRequest
 
 
 def test_climbs_of_two_clients_are_searched_for_one_after_the_other(site: Site) -> None:
@@ -215,7 +209,9 @@ def test_what_fails_while_it_takes_progress_ends_the_climb(site: Site) -> None:
     assert working(site.health(), "climbs") == 0
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV])
+@pytest.mark.parametrize(
+    "number", [signal.SIGKILL, pytest.param(signal.SIGSEGV, marks=pytest.mark.slow)]
+)
 def test_a_worker_that_is_killed_is_told_and_the_next_climb_has_another(
     site: Site, number: int
 ) -> None:
@@ -233,7 +229,12 @@ def test_a_deadline_ends_a_climb(site: Site) -> None:
     with pytest.raises(ServiceError, match=r"0\.3 s expired before the file was there") as caught:
         client.climb(replace(asked(until=str(file)), deadline=0.3))
     assert caught.value.kind == "deadline"
-    # a search that does not look at the clock loses its worker
+    assert client.climb(asked()).status == "none"
+
+
+@pytest.mark.slow
+def test_a_search_that_does_not_look_at_the_clock_loses_its_worker(site: Site) -> None:
+    client = site.client()
     with pytest.raises(ServiceError, match=r"0\.3 s expired") as caught:
         client.climb(replace(asked(sleep=600), deadline=0.3))
     assert caught.value.kind == "deadline"
@@ -276,6 +277,7 @@ def test_a_climb_ends_when_its_client_is_killed(site: Site) -> None:
     assert site.client().climb(asked()).status == "none"
 
 
+@pytest.mark.slow
 def test_a_service_that_ends_tells_the_client_of_a_climb(tmp_path: Path) -> None:
     ending = Site(tmp_path)
     client = CruxClient(client_config(ending.endpoint), timeout=PATIENCE)
