@@ -81,6 +81,15 @@ def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def blank_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw nothing into the pictures of a route, which take longer than its plans."""
+    from matplotlib.figure import Figure
+
+    for name in ("draw_route", "draw_climb", "draw_support"):
+        monkeypatch.setattr(f"planner.pictures.report.{name}", lambda *_: Figure((1.0, 1.0)))
+
+
+@pytest.fixture
 def stance_file(tmp_path: Path):
     """Writes a request to a file, and returns its path."""
 

@@ -8,7 +8,6 @@ as likely as its part of the hazard, which grows with the share of its strength 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cache
 from itertools import combinations
 from typing import NamedTuple
 
@@ -240,7 +239,6 @@ class SlipDiagnosis:
         return found
 
 
-@cache
 def _numbers() -> dict[str, float]:
     """Return the numbers of ``diagnosis.toml`` by name."""
     table = bundled_table("diagnosis.toml", "planner.parameters")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -99,7 +98,6 @@ def tension_trade(least: float, cap: float) -> TensionTrade:
     return TensionTrade(weight, least + max(min(whole, cap - least), 0.0), whole)
 
 
-@cache
 def _tension_numbers() -> tuple[float, float]:
     """Return the part of the least utilisation that is given away at most, and w."""
     table = bundled_table("plans.toml", "planner.parameters")

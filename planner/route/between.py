@@ -53,7 +53,7 @@ class Passage:
     end: HeldPosture
     excess: float = 0.02
 
-    @cached_property
+    @property
     def turn(self) -> Array:
         """Rotation vector of the body's turn, in B, shape (3,) [rad]."""
         body = self.start.posed.body

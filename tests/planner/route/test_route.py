@@ -107,6 +107,7 @@ def test_a_cap_on_the_utilisation_can_make_the_crux_too_hard(route):
     assert capped.plans[capped.crux].status == "overloaded"
 
 
+@pytest.mark.usefixtures("blank_pictures")
 @pytest.mark.parametrize("cap", [1.0, 0.3])
 def test_margin_is_the_cap_minus_the_utilisation(route, tmp_path: Path, cap):
     light = replace(route, load=Load(mass=LIGHT), limits=Limits(utilisation=cap))
@@ -193,6 +194,7 @@ def bars(axes):
     return found[np.isfinite(found).all(axis=1)]
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_the_command_asks_for_the_spread_of_every_stance(tmp_path: Path, capfd):
     draws = tmp_path / "draws.toml"
     path = tmp_path / "route.json"
@@ -340,6 +342,7 @@ def test_route_command_writes_its_files_and_prints_json_alone(
     }
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_route_command_tells_a_person_the_crux(tmp_path, capfd: pytest.CaptureFixture[str]):
     assert run_command_line(["route", laden(LIGHT, tmp_path), "-o", str(tmp_path)]) == 0
     out = capfd.readouterr().out
@@ -347,6 +350,7 @@ def test_route_command_tells_a_person_the_crux(tmp_path, capfd: pytest.CaptureFi
     assert max(len(line) for line in out.splitlines() if str(tmp_path) not in line) <= 80
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_route_command_ends_with_3_where_it_does_not_go_and_2_for_bad_input(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ):
@@ -463,6 +467,7 @@ def test_the_objective_of_a_route_is_that_of_its_stages(route):
         assert least.effort < best.effort
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_route_file_takes_joints_and_an_objective(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ):
@@ -483,6 +488,7 @@ def test_a_route_file_takes_joints_and_an_objective(
     assert capfd.readouterr().err.startswith("crux: objective: 'max_margins' is not")
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_what_is_odd_about_a_stage_is_told_once_with_its_moves(route, tmp_path: Path, capsys):
     first = route.moves[0].hand
     high = Pose(np.array([*first.pose.position[:2], 3.0]), first.pose.rotation)

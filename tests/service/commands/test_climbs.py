@@ -105,6 +105,7 @@ def test_one_stage_is_shown_as_crux_plan_shows_it_and_written(written, tmp_path,
     assert "give -o DIR, or --stage K" in complaint(capfd)
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_the_largest_change_of_a_tension_counts_between_knots(tmp_path, capfd):
     limits = planner.Limits(tension_change=8.0)
     route = msgspec.structs.replace(two_moves(), limits=limits, moves=two_moves().moves[:1])
@@ -121,6 +122,7 @@ def test_the_largest_change_of_a_tension_counts_between_knots(tmp_path, capfd):
     assert json.loads(file.read_bytes())["limits"].get("tension_change") is None
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_climb_that_fails_says_where_and_why(tmp_path, capfd):
     out = tmp_path / "out"
     route = file_of(blocked(), tmp_path)

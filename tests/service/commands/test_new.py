@@ -45,6 +45,7 @@ def test_a_new_stance_is_planned_as_the_bundled_wall(start, capfd):
     assert all(len(hand["seating"]["pose"]["orientation"]) == 4 for hand in found["hands"])
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_new_route_starts_as_a_bundled_one_and_runs_from_end_to_end(start, tmp_path):
     file, out = start("route"), tmp_path / "out"
     assert run_command_line(["route", str(file), "-o", str(out), "--json"]) == DONE

@@ -49,6 +49,7 @@ def rows(file: Path) -> list[dict]:
         return [{key: each or None for key, each in row.items()} for row in csv.DictReader(stream)]
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_routes_of_a_folder_are_answered_in_order_as_each_is_alone(climbs, tmp_path, capfd):
     file = tmp_path / "routes.jsonl"
     assert run_command_line(["route", str(climbs), BUNDLED, "--json", "-o", str(file)]) == BAD_INPUT
