@@ -60,8 +60,11 @@ def test_loads_by_equation_14_balance_at_any_tension(stance):
     own_normal, own_left = balance.solved(balance.fingers(f))
     np.testing.assert_allclose(loads[:, 1], own_normal, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(own_left, left, atol=1e-10)
-    free = left if balance.held is None else left[~balance.held]
-    np.testing.assert_allclose(free, 0.0, atol=1e-10)
+    # a joint is locked in part where its phalanx has few spines across a gap
+    free = known.bearing_shares == 1.0
+    if balance.held is not None:
+        free &= ~balance.held
+    np.testing.assert_allclose(left[free], 0.0, atol=1e-10)
     stops = [(4 * k + i, j, t) for k, hand in enumerate(known.hands) for i, j, t in hand.stops]
     assert list(zip(balance.stop_fingers, balance.stop_joints, strict=True)) == [
         (finger, joint) for finger, joint, _ in stops
