@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import resource
 
-from hand_models.rock import Mesh, generate_wall
+from hand_models.rock import Mesh
+from hand_models.scans import generate_wall
 from planner import WallSource, robosimian
 from service.processes import make_wall
 

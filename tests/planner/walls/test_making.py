@@ -15,13 +15,14 @@ from hand_models.base import (
 )
 from hand_models.fixed_wrist import wrench_spaces
 from hand_models.rock import Cylinder, Mesh
+from hand_models.scans import generate_wall
 from hand_models.tile import Surface
 from planner import deadline
 from planner.motion import Rock
 from planner.prepare import settle_each
 from planner.programs import WRENCH_UNIT
 from planner.reach import reach_table
-from planner.walls import read_wall, wall_digest, wall_of, write_wall
+from planner.walls import BodyGrid, PlaceGrid, read_wall, wall_digest, wall_of, write_wall
 from tests.suite.helpers.climbing_walls import arrays_of, tiny_source, tiny_wall
 
 DIRECTIONS = np.random.default_rng(0).normal(size=(10, 6))
@@ -206,3 +207,26 @@ def test_questions_are_plain_bytes():
     points = [point for each in questions for point in msgspec.msgpack.decode(each)["points"]]
     assert len(points) == 20
     assert all(len(trial) == 4 for point in points for trial in point)
+
+
+@pytest.mark.slow
+def test_no_limb_reaches_over_the_gap_of_the_blocked_wall():
+    # at one body, a limb goes from hold to hold on the same side only: nobody gets across
+    found = generate_wall("blocked-wall", 1)
+    rock = Mesh(found.vertices, found.faces, anywhere=True)
+    source = tiny_source(
+        rock=rock,
+        rock_pose=found.pose,
+        places=PlaceGrid(spacing=0.2, rotations=(0.0,)),
+        bodies=BodyGrid(spacing=0.25, stand_offs=(0.4, 0.6), tilts=(-0.3, 0.3)),
+    )
+    wall = wall_of(source, source.poses()).wall
+    above = np.array([(found.pose.inverse() @ place.pose).position[0] for place in wall.places]) > 0
+    reached = wall.reach.reached
+    low, high = (reached[each].any(axis=0) for each in (~above, above))
+    assert low.any(axis=0).all()
+    assert high.any(axis=0).all()
+    assert not (low & high).any()
+    # there are bodies over the gap, which reach one side or the other
+    over = np.abs([(found.pose.inverse() @ body).position[0] for body in wall.bodies]) < 0.5
+    assert (low | high)[over].any()

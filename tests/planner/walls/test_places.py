@@ -26,9 +26,9 @@ def tried():
 
 
 def largest_force(settled, up):
-    """Largest force of the rock on a hand along a direction in the rock's frame alone, by HiGHS [N].
+    """Largest force of the rock on a hand straight along a direction in the rock's frame [N].
 
-    It is None if every force has components across.
+    By HiGHS; None if every force has components across.
     """
     space, axes = wrench_space(settled), settled.seating.pose.rotation
     way = axes @ up
