@@ -196,6 +196,35 @@ def test_a_climb_from_a_stance():
     assert check_bound(replace(proof_of(fixed, 0.1, answers), reached=reached)).proven
 
 
+def test_a_climb_by_hand():
+    """Two limbs on three hands that pull straight up: 0.8 times the body's weight is the best.
+
+    From (0, 1) to (2, 1) the left hand has to leave the right one alone on the second. Else (0, ·),
+    (0, 2), (·, 2) and (1, 2) are left; (·, 1) and (1, ·) are ruled out.
+    """
+    up = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    climb = replace(
+        random_climb(0, placements=3, bodies=1, limbs=2, reach=2.0),
+        multiple=0.9,
+        points=np.array([0.0, 1.2, 0.0, 0.8, 0.0, 1.5])[:, None] * up,
+        rows=np.zeros((6, 0)),
+        parts=np.array([0, 2, 4, 6]),
+        hands=np.arange(4),
+        base=np.zeros((3, 6)),
+        room=np.zeros((3, 0)),
+        wrenches=up[None],
+        moments=np.zeros((1, 2, 3, 3)),
+        apart=~np.eye(3, dtype=bool),
+        start_members=np.array([0, 1]),
+        goal_members=np.array([2, 1]),
+        directions=up[None],
+    )
+    assert check_bound(climb) == (True, 5, 2, None)
+    # what is exactly held counts as held
+    for multiple, proven in ((0.8 + 1e-9, True), (0.8, False), (0.7, False)):
+        assert check_bound(replace(climb, multiple=multiple)).proven == proven
+
+
 def test_refuses_more_states_than_it_can_number():
     climb = random_climb(1, placements=700, bodies=2, limbs=7, reach=0.0)
     with pytest.raises(LimitError, match="700 placements, 2 bodies and 7 limbs"):
