@@ -1,4 +1,4 @@
-"""What moves in a climb: a hand along its opening path, and the body on all hands."""
+"""States of what moves in a climb: a hand along its opening path, and the body on all hands."""
 
 from __future__ import annotations
 
