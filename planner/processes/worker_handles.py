@@ -235,7 +235,7 @@ def send_part(part: object) -> None:
     """Send a part of the answer on which this thread of a worker is at work, before the answer.
 
     The process that asked gets parts by `PriorityLane.take`, as it gets answers, and must be able
-    to tell them apart. In other threads and processes nothing is sent.
+    to distinguish them. In other threads and processes nothing is sent.
     """
     if (send := _sender.get()) is not None:
         send(part)

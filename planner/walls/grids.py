@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from msgspec import Meta, field
 
 from hand_models.base import InvalidFieldError, Strict, errors_under
 from hand_models.hand import Grasp
-from hand_models.parameters import ParameterTable, bundled_table
+
+if TYPE_CHECKING:
+    from hand_models.parameters import ParameterTable
 
 __all__ = ["BodyGrid", "PlaceGrid"]
 
@@ -25,6 +27,9 @@ Several = Annotated[tuple[float, ...], Meta(min_length=1, max_length=32)]
 
 
 def _table() -> ParameterTable:
+    # a client that only sends requests does without numbers
+    from hand_models.parameters import bundled_table
+
     return bundled_table("wall_grids.toml", "planner.parameters")
 
 

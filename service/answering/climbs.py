@@ -33,7 +33,7 @@ Report = Callable[[PartReply], None]
 
 
 class SoughtClimb(NamedTuple):
-    """What came of the search for a climb.
+    """Outcome of the search for a climb.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ def seek_climb(
         more_places=places,
         more_bodies=[body for body, _ in stances.values()],
     )
-    told, bodies = _Progress(request.id, report), source.poses()
+    progress, bodies = _Progress(request.id, report), source.poses()
     origins = np.array([body.position for body in bodies.poses])
     # stances have the last poses and placements, in the order of the ends
     last = dict(zip(stances, range(-len(stances), 0), strict=True))
@@ -127,9 +127,9 @@ def seek_climb(
     }
     try:
         if make is None:
-            made = wall_of(source, bodies, report=told.wall)
+            made = wall_of(source, bodies, report=progress.wall)
         else:
-            made = make(source, told.wall)
+            made = make(source, progress.wall)
     except InvalidInputError as error:
         raise _named(error, list(given)) from None
     count, limbs = len(made.wall.places), len(robot.limbs)
@@ -151,7 +151,7 @@ def seek_climb(
         within=request.best_within,
         at_least=request.at_least,
         seconds=None if math.isinf(seconds) else seconds,
-        progress=told.search,
+        progress=progress.search,
     )
     return SoughtClimb(found, made, mesh, pose, start, goal)
 
@@ -173,11 +173,11 @@ def climb_reply(
     knots: list[KnotReply] | UnsetType = UNSET
     if "trajectory" in request.want and found.climb is not None:
         if report is not None and request.parts:
-            told = KnotParts(request.id, report)
+            send = KnotParts(request.id, report)
             every = found.climb.knots
             for i, knot in enumerate(every, start=1):
                 if i == len(every) or every[i].move != knot.move:
-                    told(every[:i])
+                    send(every[:i])
         else:
             knots = [KnotReply.of(knot) for knot in found.climb.knots]
     return ClimbReply(
@@ -223,8 +223,8 @@ def answer_climb(
     InvalidInputError
         If the request is impossible. The error's ``field`` is a path in the request.
     """
-    told = report if request.parts else None
-    return climb_reply(request, seek_climb(request, robots, told), told)
+    parts = report if request.parts else None
+    return climb_reply(request, seek_climb(request, robots, parts), parts)
 
 
 def _rock(message: requests.Mesh | str, numbers: ParameterTable) -> tuple[rock.Mesh, Pose]:

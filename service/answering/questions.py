@@ -291,11 +291,11 @@ class KnotParts:
 
     def __init__(self, identifier: str | None, report: Callable[[PartReply], None]) -> None:
         self._identifier, self._report = identifier, report
-        self._told = 0
+        self._count = 0
 
     def __call__(self, knots: Sequence[Knot]) -> None:
         """Report the knots that were not there at the last call, if any."""
-        new, self._told = knots[self._told :], len(knots)
+        new, self._count = knots[self._count :], len(knots)
         if new:
             self._report(PartReply(id=self._identifier, knots=[KnotReply.of(each) for each in new]))
 
@@ -331,11 +331,11 @@ def climb(
     from planner import evaluate, plan_climb
 
     route, found = route_of(request, robots), None
-    told = None if report is None or not request.parts else KnotParts(request.id, report)
+    parts = None if report is None or not request.parts else KnotParts(request.id, report)
     if "trajectory" in request.want:
-        found = plan_climb(route, knots=told)
-        if told is not None:
-            told(found.knots)
+        found = plan_climb(route, knots=parts)
+        if parts is not None:
+            parts(found.knots)
     result = evaluate(route, workers=1, climb=found)
     crux = result.plans[result.crux]
     return RouteReply(
@@ -351,7 +351,7 @@ def climb(
         stages=stage_replies(result),
         warnings=list(dict.fromkeys(text for p in result.plans for text in p.warnings)),
         trajectory=UNSET
-        if found is None or told is not None
+        if found is None or parts is not None
         else [KnotReply.of(knot) for knot in found.knots],
         failure=UNSET if found is None else ClimbFailureReply.of(found.failure),
     )

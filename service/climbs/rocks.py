@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from hand_models.rock import read_mesh
-from hand_models.scans import wall_names
 from service import requests
 
 __all__ = ["rock_message"]
@@ -23,6 +21,10 @@ def rock_message(rock: Path, lean: float) -> requests.Mesh | str:
     lean : float
         Angle of a mesh's x from the vertical, away from the climber [rad].
     """
+    # completion of a command line does without numbers
+    from hand_models.rock import read_mesh
+    from hand_models.scans import wall_names
+
     if not rock.exists() and str(rock).partition(":")[0] in wall_names():
         return str(rock)
     vertices, faces = read_mesh(rock)

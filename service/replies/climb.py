@@ -145,7 +145,7 @@ class ClimbFailureReply(Struct, kw_only=True):
 
 
 class SearchProgress(Struct, kw_only=True):
-    """How far the search for a climb is.
+    """Progress of the search for a climb.
 
     - ``phase``: what is being done: ``placements``, ``reach``, ``sets``, ``search``, ``moves`` or
       ``stages``.

@@ -42,7 +42,7 @@ class EndHand(Strict, frozen=True, kw_only=True):
 
 
 class ClimbEnd(Strict, frozen=True, kw_only=True):
-    """Where a climb begins, or has to end, with all hands on the rock: one of three ways to say it.
+    """End of a climb, its start or its goal, with all hands on the rock; one of three ways.
 
     - ``near``: point of W within ``radius`` of which the body's origin is [m].
     - ``radius``: distance from ``near``; 0.3 m by default [m].

@@ -30,7 +30,7 @@ def digest(secret: bytes) -> bytes:
 
 
 class ClientIdentity:
-    """What a client declares, so that a service gives it its turns and knows when it has gone.
+    """Declarations of a client, by which a service gives it its turns and knows when it has gone.
 
     Parameters
     ----------

@@ -13,13 +13,7 @@ import msgspec
 
 from hand_models.base import CruxError, InvalidInputError, LimitError, UnsupportedError
 from service.replies import ErrorDetail, ErrorReply
-from service.requests import (
-    CancelRequest,
-    Identifier,
-    ReplyBytes,
-    SetPointsRequest,
-    StreamRequest,
-)
+from service.requests import CancelRequest, Identifier, ReplyBytes, SetPointsRequest, StreamRequest
 from service.wire.duplicate_keys import refuse_in_json, refuse_in_msgpack
 from service.wire.errors import BusyError, MalformedError
 from service.wire.validation_errors import validation_error
@@ -157,7 +151,7 @@ class Answer(NamedTuple):
     cost : float
         Processor time that the answer took [s]; other programs on the machine do not change it.
     last : bool
-        False for a part of the answer, after which more replies to the same query follow.
+        False for a part of the answer, which more replies to the query follow.
     """
 
     payload: bytes
@@ -258,11 +252,9 @@ def _parts(value: object) -> Iterator[tuple[str, object]]:
 def most_bytes(kind: type) -> int:
     """Return the maximum bytes of a request of a given type; larger payloads are not decoded."""
     if kind is SetPointsRequest or kind is CancelRequest:
-        # they have no rock
-        return 2**12
+        return 2**12  # they have no rock
     if kind is StreamRequest:
-        # streams are kept: sixteen of them have to fit into one process
-        return 2**24
+        return 2**24  # streams are kept: sixteen of them have to fit into one process
     return LARGEST_REQUEST
 
 
@@ -272,9 +264,8 @@ def check_size(size: int, kind: type) -> None:
     Parameters
     ----------
     size : int
-        Size of the payload [bytes].
+        Of the payload [bytes].
     kind : type
-        Type of the request.
 
     Raises
     ------
