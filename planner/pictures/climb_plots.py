@@ -170,9 +170,7 @@ def plot_wall(found: FoundClimb, rock: Mesh, rock_pose: Pose, path: Path) -> Non
     figure = Figure(figsize=(13.0, 7.5), layout="constrained")
     axes, lower = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
     vertices = rock.triangles.vertices
-    axes.hexbin(
-        *vertices[:, [1, 0]].T, C=-vertices[:, 2], gridsize=60, cmap="gray", linewidths=0.1
-    )
+    axes.hexbin(*vertices[:, [1, 0]].T, C=-vertices[:, 2], gridsize=60, cmap="gray", linewidths=0.1)
     up = np.eye(6)[2:3]
     lifts = wall.screening.hands.supports(up)[:, 0] * WRENCH_UNIT[2]
     places = flat([each.pose for each in wall.places])

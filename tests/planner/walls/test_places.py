@@ -26,7 +26,7 @@ def tried():
 
 
 def largest_force(settled, up):
-    """Largest force of the rock on a hand straight along a direction in the rock's frame [N].
+    """Largest force of the rock on a hand along a direction of the rock's frame alone, by HiGHS.
 
     By HiGHS; None if every force has components across.
     """
