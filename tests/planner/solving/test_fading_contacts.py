@@ -148,7 +148,7 @@ def test_a_plan_with_half_a_tiles_spines_is_that_of_its_loads(half):
                 assert tile.shear == pytest.approx(at_zero + slope * f[i], rel=1e-9)
                 if not share:
                     continue
-                # each spine, as of a whole tile; few ones are held against no less than a least share
+                # each spine, as of a whole tile; few ones bear no less than a least share
                 limit = hand.limit_shares[t]
                 assert limit == share or (limit > share and share < 0.1)
                 load = np.array([tile.shear, tile.normal, abs(tile.lateral)]) / limit

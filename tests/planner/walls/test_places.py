@@ -26,9 +26,9 @@ def tried():
 
 
 def largest_force(settled, up):
-    """Largest force of the rock on a hand along a direction of the rock's frame alone, by HiGHS.
+    """Largest force of the rock on a hand along a direction of the rock's frame alone [N], by HiGHS.
 
-    By HiGHS; None if every force has components across.
+    None if every force has components across.
     """
     space, axes = wrench_space(settled), settled.seating.pose.rotation
     way = axes @ up
