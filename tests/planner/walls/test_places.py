@@ -26,7 +26,7 @@ def tried():
 
 
 def largest_force(settled, up):
-    """Largest force of the rock on a hand along a direction of the rock's frame alone [N], by HiGHS.
+    """Largest force of rock on a hand along a direction of the rock's frame alone [N], by HiGHS.
 
     None if every force has components across.
     """
