@@ -129,10 +129,10 @@ def test_what_is_next_to_what_can_be_had_has_its_proof_too():
     """The way to the nearest loads is short then: what proves has a unit of its own."""
     for seed, times, status in [
         (5117, 0.9, "infeasible"),
-        (5071, 1.0001, "overloaded"),
+        (5029, 1.0001, "overloaded"),
         (5013, 1.0001, "overloaded"),
         (5020, 1.00001, "overloaded"),
-        (5539, 1.00001, "infeasible"),
+        (5054, 1.00001, "infeasible"),
     ]:
         asked = random_question(seed, "load_factor")
         needed = times * plan(asked).load_factor * asked.needed_wrench()
@@ -145,11 +145,12 @@ def test_what_is_next_to_what_can_be_had_has_its_proof_too():
 
 def test_a_plan_that_the_checks_refuse_by_a_hair_is_sought_next_to_what_is_needed():
     """Solvers call a few μN off balance solved; of next to no wrench that is too much."""
-    asked = random_question(6006, "load_factor")
-    needed = (1.0 + 3e-6) * plan(asked).load_factor * asked.needed_wrench()
-    answer = plan(replace(asked, body_wrench=needed))
-    assert answer.status == "optimal"
-    assert np.linalg.norm(answer.residual) <= 1e-6
+    for seed in (6117, 6249):
+        asked = random_question(seed, "load_factor")
+        needed = (1.0 + 3e-6) * plan(asked).load_factor * asked.needed_wrench()
+        answer = plan(replace(asked, body_wrench=needed))
+        assert answer.status == "optimal"
+        assert np.linalg.norm(answer.residual) <= 1e-6
 
 
 def test_loads_beyond_all_strength_are_none():
