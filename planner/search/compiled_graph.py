@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, compiled
 
-__all__ = ["NODE", "bit_masks", "expand", "hash_table", "rule_out", "touching"]
+__all__ = ["LIFT_NODE", "bit_masks", "expand", "hash_table", "rule_out", "touching"]
 
-NODE = np.dtype(
+LIFT_NODE = np.dtype(
     [
         ("claimed", np.intp),  # sum of the ends from which it was reached: 1 start, 2 goal
         ("closed", np.intp),  # the end that has passed it: its neighbours were looked at
@@ -110,7 +110,7 @@ def touching(
     return touched
 
 
-@compiled(NODE, "i1", "i1", "i1", "i2", "f1", "f2", "f2", "f4", "f1", "f0")
+@compiled(LIFT_NODE, "i1", "i1", "i1", "i2", "f1", "f2", "f2", "f4", "f1", "f0")
 def rule_out(
     nodes: NDArray[np.void],
     bodies: Indices,
@@ -128,7 +128,7 @@ def rule_out(
 
     Parameters
     ----------
-    nodes : ndarray of `NODE`, shape (n,)
+    nodes : ndarray of `LIFT_NODE`, shape (n,)
     bodies : ndarray of int, shape (n,)
         Body of each lift.
     starts : ndarray of int, shape (T + 1,)
@@ -169,7 +169,7 @@ def rule_out(
 
 
 @compiled(
-    NODE, "i1", "i1", "i2", "i1", "i1", "i1", "i2", "i3", "i1", "i1", "b2", "i2", "i2",
+    LIFT_NODE, "i1", "i1", "i2", "i1", "i1", "i1", "i2", "i3", "i1", "i1", "b2", "i2", "i2",
     "f2", "f2", "f2", "f4", "f1", "f0", "i1", "i0",
 )  # fmt: skip
 def expand(
@@ -200,7 +200,7 @@ def expand(
 
     Parameters
     ----------
-    nodes : ndarray of `NODE`, shape (n,)
+    nodes : ndarray of `LIFT_NODE`, shape (n,)
         Claims, parents and placements on the way are written.
     bodies, triples : ndarray of int, shape (n,)
         Body and triple of each lift.

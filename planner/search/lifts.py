@@ -194,7 +194,7 @@ class Lifts:
         LimitError
             If there are too many.
         """
-        from planner.search.compiled_graph import NODE
+        from planner.search.compiled_graph import LIFT_NODE
 
         count, bodies, limbs = ground.reached.shape
         found, left = list[Indices](), SEARCH_SETTINGS.most_lifts
@@ -230,7 +230,7 @@ class Lifts:
             members=_unpacked(keys, count, limbs),
             starts=np.append(starts, len(order)),
             keys=keys,
-            nodes=np.zeros(len(order), dtype=NODE),
+            nodes=np.zeros(len(order), dtype=LIFT_NODE),
             counts=counts,
         )
 

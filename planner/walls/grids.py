@@ -67,7 +67,7 @@ def _check_several(grid: Any, *names: str) -> None:
 
 
 class PlaceGrid(Strict, frozen=True):
-    """Where hands are tried on a rock, and which are kept.
+    """Grid of places where hands are tried on a rock, and which of them are kept.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class PlaceGrid(Strict, frozen=True):
 
 
 class BodyGrid(Strict, frozen=True):
-    """Where the body may be before a rock.
+    """Grid of poses that the body may have before a rock.
 
     The body faces the mean plane of the whole rock: its z points away from the rock, its x along x
     of the rock's frame. So bodies of one tilt have one orientation.

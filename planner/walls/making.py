@@ -66,7 +66,7 @@ class Chunk(msgspec.Struct, omit_defaults=True):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WallSource:
-    """What a wall is made from; it can be pickled.
+    """Source of a wall: all that it is made from; it can be pickled.
 
     All limbs of a robot have the same hand, so any limb may take any placement.
 

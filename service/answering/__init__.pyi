@@ -27,7 +27,7 @@ from .own_models import (
     with_robot as with_robot,
 )
 from .questions import (
-    pose_message as pose_message,
+    pose_of_request as pose_of_request,
     question as question,
     route_of as route_of,
     route_request as route_request,

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 __all__ = [
     "KnotParts",
     "climb",
-    "pose_message",
+    "pose_of_request",
     "question",
     "route_of",
     "route_request",
@@ -152,7 +152,7 @@ def route_request(asked: requests.ClimbRequest, route: Route) -> requests.RouteR
         robot=asked.robot,
         hand=asked.hand,
         gravity=_vector(start.gravity),
-        body=pose_message(start.body),
+        body=pose_of_request(start.body),
         joints=joints if joints is None or isinstance(joints, str) else _lists(joints),
         hands=[requests.Hand(**_hand_fields(asked, hand)) for hand in start.hands],
     )
@@ -165,12 +165,12 @@ def route_request(asked: requests.ClimbRequest, route: Route) -> requests.RouteR
         moves=[
             requests.Move(
                 **_hand_fields(asked, move.hand),
-                body=None if move.body is None else pose_message(move.body),
+                body=None if move.body is None else pose_of_request(move.body),
                 joints="solve" if isinstance(move.joints, str) else _lists(move.joints),
             )
             for move in route.moves
         ],
-        end=None if route.end is None else pose_message(route.end),
+        end=None if route.end is None else pose_of_request(route.end),
         explain=route.explain,
     )
 
@@ -178,13 +178,13 @@ def route_request(asked: requests.ClimbRequest, route: Route) -> requests.RouteR
 def _hand_fields(asked: requests.ClimbRequest, hand: HandOnHold) -> dict[str, Any]:
     """Return the fields of a hand of a request that is on the climb's rock."""
     assert hand.hold_in_hand is not None
-    hold = requests.RockReference(rock="rock", pose_in_hand=pose_message(hand.hold_in_hand))
+    hold = requests.RockReference(rock="rock", pose_in_hand=pose_of_request(hand.hold_in_hand))
     surface, grasp = asked.surface, hand.grasp
-    own = {"limb": hand.limb, "pose": pose_message(hand.pose), "hold": hold}
+    own = {"limb": hand.limb, "pose": pose_of_request(hand.pose), "hold": hold}
     return own | {"surface": surface, "grasp": grasp}
 
 
-def pose_message(pose: Pose) -> requests.Pose:
+def pose_of_request(pose: Pose) -> requests.Pose:
     """Return a pose as a message."""
     x, y, z, w = pose.quaternion().tolist()
     return requests.Pose(position=_vector(pose.position), orientation=(x, y, z, w))
