@@ -1,6 +1,7 @@
 from .generated import (
     RockSource as RockSource,
     generate_wall as generate_wall,
+    named_wall as named_wall,
     read_rock as read_rock,
     wall_names as wall_names,
 )

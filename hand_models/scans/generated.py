@@ -11,7 +11,7 @@ from hand_models.base import Array, Indices, InvalidInputError, Pose
 from hand_models.parameters import ParameterTable, wall_table
 from hand_models.rock import Triangles, grid, read_mesh
 
-__all__ = ["RockSource", "generate_wall", "read_rock", "wall_names"]
+__all__ = ["RockSource", "generate_wall", "named_wall", "read_rock", "wall_names"]
 
 
 class RockSource(NamedTuple):
@@ -92,6 +92,36 @@ def generate_wall(
     return RockSource(vertices, faces, Pose(-x[0] * axes[:, 0], axes))
 
 
+def named_wall(rock: Path) -> tuple[str, int] | None:
+    """Return the wall that a path names, as `generate_wall` takes it: its name and its seed.
+
+    Parameters
+    ----------
+    rock : Path
+        As of `read_rock`.
+
+    Returns
+    -------
+    tuple of (str, int), or None
+        None for a file, and for a name that is no wall's.
+
+    Raises
+    ------
+    InvalidInputError
+        If the seed is no whole number.
+    """
+    name, colon, seed = str(rock).partition(":")
+    if name not in wall_names() or rock.exists():
+        return None
+    if colon and not (seed.isascii() and seed.isdigit()):
+        raise InvalidInputError(
+            f"the seed of a wall must be a whole number, got {seed!r}; valid is, for example, "
+            f"{name}:3",
+            field="rock",
+        )
+    return name, int(seed or 0)
+
+
 def read_rock(rock: Path) -> RockSource:
     """Read a mesh file in metres, or generate the bundled wall of that name.
 
@@ -106,15 +136,9 @@ def read_rock(rock: Path) -> RockSource:
     InvalidInputError
         If the file cannot be read, or there is neither a file nor a wall of this name.
     """
-    name, colon, seed = str(rock).partition(":")
-    if name in wall_names() and not rock.exists():
-        if colon and not (seed.isascii() and seed.isdigit()):
-            raise InvalidInputError(
-                f"the seed of a wall must be a whole number, got {seed!r}; valid is, for example, "
-                f"{name}:3",
-                field="rock",
-            )
-        return generate_wall(name, int(seed or 0))
+    wall = named_wall(rock)
+    if wall is not None:
+        return generate_wall(*wall)
     if not rock.suffix and not rock.exists():
         raise InvalidInputError(
             f"no file {rock}, and no wall of this name; generated walls are "

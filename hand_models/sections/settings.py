@@ -28,6 +28,9 @@ class SectionSettings:
     envelope_spacing: float = 5e-4
     """Distance of points of the outline there, as on smoothed rock: between two of them a fillet of
     5 mm stands out by 6 μm [m]."""
+    envelope_end: float = 1e3
+    """Multiple of a finger's reach beyond which an outline ends: along a log it would go on until
+    rounding lets the axis of the log slope, by 10¹⁵ m."""
     most_circles: int = 10
     """Largest number of circles fitted to an ellipse in turn; two or three are mostly enough."""
     last_turn: float = 1e-8

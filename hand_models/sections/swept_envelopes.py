@@ -108,7 +108,8 @@ class _Slab:
             ways = np.column_stack([np.cos(turns), np.sin(turns)])
             # from outside the rock, against these ways; along some it never ends
             far = -self._begins(inside, -ways, half)
-            far[_endless(self._shape, ways @ self._plane)] = np.inf
+            endless = _endless(self._shape, ways @ self._plane)
+            far[endless | (far > SECTION_SETTINGS.envelope_end * reach)] = np.inf
             with np.errstate(invalid="ignore"):
                 return np.asarray(inside + far[:, None] * ways)
 

@@ -237,7 +237,8 @@ class _Graph:
 
 def _multiples(total: Array, needed: Array) -> tuple[Array, Array]:
     """Return which multiples of ``needed`` are at most ``total``: from the first to the second."""
-    share = total / np.where(needed == 0.0, -1e-200, needed)
+    with np.errstate(over="ignore"):  # infinite is far enough
+        share = total / np.where(needed == 0.0, -1e-200, needed)
     up = needed > 0.0
     return np.where(up, 0.0, share), np.where(up, share, np.inf)
 

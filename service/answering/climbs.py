@@ -287,9 +287,14 @@ def _bodies_near(name: str, end: requests.ClimbEnd, origins: Array) -> NDArray[n
     if name == "start":
         there, words = heights <= end.height, "at most"
     if not there.any():
+        # rounded so that either number is a height that is accepted
+        low, high = (
+            math.ceil(100.0 * heights.min()) / 100.0,
+            math.floor(100.0 * heights.max()) / 100.0,
+        )
         raise InvalidInputError(
-            f"no pose of the body is {words} so high; they are {heights.min():.2f} m to "
-            f"{heights.max():.2f} m high, got {end.height:g} m",
+            f"no pose of the body is {words} so high; they are {low:.2f} m to {high:.2f} m high, "
+            f"got {end.height:g} m",
             field=f"{name}.height",
         )
     return np.asarray(there)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+from hand_models.base import InvalidInputError
 from service import requests
 
 __all__ = ["rock_message"]
@@ -20,14 +21,24 @@ def rock_message(rock: Path, lean: float) -> requests.Mesh | str:
         such file, the name of a generated wall.
     lean : float
         Angle of a mesh's x from the vertical, away from the climber [rad].
+
+    Raises
+    ------
+    InvalidInputError
+        If the file cannot be read, there is neither a file nor a wall of this name, or a lean is
+        given of a wall.
     """
     # completion of a command line does without numbers
-    from hand_models.rock import read_mesh
-    from hand_models.scans import wall_names
+    from hand_models.scans import named_wall, read_rock
 
-    if not rock.exists() and str(rock).partition(":")[0] in wall_names():
+    if named_wall(rock) is not None:
+        if lean:
+            raise InvalidInputError(
+                f"is for a mesh file; {rock} has a lean of its own: leave it out, got {lean:g}",
+                field="--lean",
+            )
         return str(rock)
-    vertices, faces = read_mesh(rock)
+    vertices, faces, _ = read_rock(rock)
     sine, cosine = math.sin(lean), math.cos(lean)
     pose = requests.Pose(
         position=(0.0, 0.0, 0.0), x_axis=(sine, 0.0, cosine), z_axis=(cosine, 0.0, -sine)

@@ -74,5 +74,6 @@ def _sentences(found: FoundClimb, at_least: float | None) -> Iterator[str]:
         yield f"  there {each.load_factor:.3f} with {each.change}"
     for kind in found.refused[:3]:
         times = f"{kind.count} moves" if kind.count > 1 else "a move"
-        yield f"{times} had no plan ({kind.phase} of {kind.limb}): {kind.reason}"
+        which = kind.phase if kind.limb is None else f"{kind.phase} of {kind.limb}"
+        yield f"{times} had no plan ({which}): {kind.reason}"
     yield found.about

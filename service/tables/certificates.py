@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from planner import BoundCheck, ClimbCertificate, RouteCheck
-from service.tables.layout import in_colour, in_order, print_rows
+from service.tables.layout import in_colour, in_order, print_rows, verbosity
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,6 +18,8 @@ def print_certificate(
 ) -> None:
     """Print the claims of a certificate as a table: what they rest on, and whether they hold.
 
+    With the verbosity -1, only the latter is printed, a line for each.
+
     Parameters
     ----------
     claimed : ClimbCertificate
@@ -28,10 +30,20 @@ def print_certificate(
     """
     places, bodies, limbs = claimed.reached.shape
     begin, end = ("goal", "start") if claimed.backward else ("start", "goal")
+    stated = ""
+    if len(route.factors):
+        stated = f"{len(route.factors)} states, least load factor {claimed.route_factors.min():.6g}"
     ways = len(claimed.directions) + len(claimed.own_directions)
     claim = f"no climb has a least load factor of {claimed.multiple:.6g} or more"
+    if not claimed.multiple:
+        claim = "there is no climb, whatever its load factor"
+    if verbosity() < 0:
+        out.print(f"{claim}: {'proven' if bound.proven else 'not proven'}", highlight=False)
+        if len(route.factors):
+            out.print(f"route of {stated}: {route.fault or 'as stated'}", highlight=False)
+        return
     rows = [
-        ("bound", claim if claimed.multiple else "there is no climb, whatever its load factor"),
+        ("bound", claim),
         (
             "rests on",
             f"{places} placements, {bodies} bodies, {limbs} limbs, {claimed.reached.sum():,} of "
@@ -52,7 +64,6 @@ def print_certificate(
         position = ", ".join(f"{x:.2f}" for x in claimed.body_poses[body, :3])
         rows.append(("", f"the {end} is connected: body {body} at ({position}) m, {where}"))
     if len(route.factors):
-        stated = f"{len(route.factors)} states, least load factor {claimed.route_factors.min():.6g}"
         right = in_colour("optimal", "as stated") if route.fault is None else route.fault
         rows += [("route", stated), ("", right)]
         if bound.proven and route.least > 0.0:

@@ -80,6 +80,29 @@ def test_rock_alike_across_a_finger_is_met_in_its_plane() -> None:
             assert len(rock.strips.across) == 1
 
 
+@pytest.mark.parametrize("hold", [Cylinder(0.3), Cylinder(626.0), Edge(0.1, 1.5)], ids=str)
+def test_an_outline_along_an_axis_ends_within_a_thousand_reaches(hold) -> None:
+    for turn in (90.0, 90.0 + 1e-12, -90.0):
+        s = turned(turn)[:, 0]
+        rock = hold.finger_rock([0.01, -0.03, -0.004], s, [0, 0, 1], SIZE)
+        for section in (rock.tile, rock.frame):
+            (points,) = section.outline(0.2, 1e-3)
+            assert np.abs(points).max() <= 1.01e3 * SIZE.reach
+            # straight under the finger, by the slab's distance from the crest
+            near = np.abs(points.real) < SIZE.reach
+            assert (np.abs(points[near].imag - 0.004) < 2e-3).sum() >= 2
+
+
+@pytest.mark.parametrize("diameter", [626.1423534612566, 700.0, 5e4])
+def test_along_a_log_of_hundreds_of_metres_a_hand_holds_as_on_a_plane(diameter) -> None:
+    """The log falls by 8 μm below a hand."""
+    pose = Pose(np.array([-0.02547901, 0.00589423, 0.00414809]), turned(90.0))
+    log, plane = (
+        reaches(HAND.settle(on, ROCK, PINCH, pose)) for on in (Cylinder(diameter), Plane())
+    )
+    np.testing.assert_allclose(log, plane, rtol=0.02, atol=0.01 * np.abs(plane).max())
+
+
 def mesh_of(hold: Hold) -> Mesh:
     """The hold, within a hand's reach, as triangles of some millimetres."""
     if isinstance(hold, Sphere | Ellipsoid):

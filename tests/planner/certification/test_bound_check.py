@@ -151,6 +151,16 @@ def test_notices_that_a_direction_is_gone():
         assert not check_bound(less).proven
 
 
+def test_a_direction_of_huge_numbers_rules_out_no_less_than_none():
+    climb, answers, best, _ = open_climb()
+    claimed = proof_of(climb, 1.01 * best, answers)
+    huge = claimed.directions.copy()
+    huge[len(huge) // 2, 0] = 1e200
+    less = np.delete(claimed.directions, len(huge) // 2, axis=0)
+    found = [check_bound(replace(claimed, directions=each)).proven for each in (huge, less)]
+    assert found[0] >= found[1]
+
+
 def test_notices_a_lower_multiple():
     proof, _, _ = bottleneck()
     assert not check_bound(replace(proof, multiple=proof.multiple / 1.011)).proven

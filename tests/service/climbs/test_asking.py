@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hand_models.base import InvalidInputError
-from service.climbs import Sought, climb_end
+from planner import BodyGrid, PlaceGrid
+from planner.climbs import RefusedMoves
+from service.answering import seek_climb
+from service.climbs import Sought, climb_end, print_verdict
 from service.commands.stances import read_request
+from service.requests import ClimbEnd, ClimbRequest
+from service.tables import console
 
 TEXTS = {
     "start": "0.1,-0.2,0.3",
@@ -22,8 +28,12 @@ TEXTS = {
     "spacing": 0.2,
     "body_spacing": None,
     "stand_off": (0.6,),
-    "lean": 0.5,
+    "lean": 0.0,
 }
+
+
+class AcceptedError(Exception):
+    """The ends of the climb were accepted."""
 
 
 def sought(**changes):
@@ -69,10 +79,55 @@ def test_a_mesh_stands_in_the_world_as_it_leans(tmp_path):
         "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
         "0 0 0\n0 1 0\n1 0 0\n3 0 1 2\n"
     )
-    request = Sought(**TEXTS).request(file, read_request)
+    request = Sought(**TEXTS | {"lean": 0.5}).request(file, read_request)
     assert request.name == "flat"
     x, z = (np.array(axis) for axis in (request.rock.pose.x_axis, request.rock.pose.z_axis))
     # up and away from the climber, who looks along x of W
     np.testing.assert_allclose(x, [np.sin(0.5), 0.0, np.cos(0.5)])
     np.testing.assert_allclose([x @ z, z[2]], [0.0, -np.sin(0.5)], atol=1e-12)
     assert len(request.rock.vertices) == 3
+
+
+def test_an_end_that_a_refusal_names_is_accepted():
+    rock, spacing = "small-wall", 0.4
+    given = {"places": PlaceGrid(spacing=spacing), "bodies": BodyGrid(spacing=spacing)}
+
+    def said(start, goal):
+        request = ClimbRequest(
+            v=1, rock=rock, start=ClimbEnd(height=start), goal=ClimbEnd(height=goal), **given
+        )
+
+        def make(source, report):
+            raise AcceptedError
+
+        with pytest.raises((InvalidInputError, AcceptedError)) as caught:
+            seek_climb(request, make=make)
+        return str(caught.value)
+
+    for ends, end in (((0.0, 9.0), 0), ((9.0, 9.0), 1)):
+        words = said(*ends).split()
+        low, high = (float(words[i]) for i in (words.index("are") + 1, words.index("to") + 1))
+        ends = [9.0, -9.0]
+        ends[end] = (low, high)[end]
+        assert said(*ends) == ""
+
+
+def test_a_move_of_no_limb_is_told_without_one(capsys):
+    refused = [
+        RefusedMoves(limb=limb, phase=phase, reason="too far", count=1)
+        for limb, phase in ((None, "shift"), ("rear_left", "swing"))
+    ]
+    found = SimpleNamespace(
+        status="unknown",
+        least=None,
+        climb=None,
+        bound=0.7,
+        deciding=None,
+        raises=(),
+        about="",
+        refused=refused,
+    )
+    print_verdict(found, None, {}, console())
+    printed = capsys.readouterr().out
+    assert "a move had no plan (shift): too far" in printed
+    assert "a move had no plan (swing of rear_left): too far" in printed

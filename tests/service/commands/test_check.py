@@ -30,6 +30,11 @@ def test_says_whether_the_bound_is_proven(share, status, tmp_path, capsys):
     assert f"7 states, least load factor {best:.6g} as stated" in printed
     assert ("not proven the goal is connected: body 2 at" in printed) == (status == OVERLOADED)
     assert ("is at most 1.00% larger" in printed) == (status == DONE)
+    assert run_command_line([*arguments, "-q"]) == status
+    verdict = {DONE: "or more: proven", OVERLOADED: "or more: not proven"}[status]
+    bound, route = capsys.readouterr().out.splitlines()
+    assert bound.endswith(verdict)
+    assert route == f"route of 7 states, least load factor {best:.6g}: as stated"
     assert run_command_line([*arguments, "--json"]) == status
     found = json.loads(capsys.readouterr().out)
     assert found["proven"] == (status == DONE)

@@ -17,7 +17,9 @@ SMALL = ("climb", "small-wall", "--spacing", "0.16", "--stand-off", "0.6", "--st
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (("climb", "no-wall", *ENDS), "no-wall"),
+        (("climb", "no-wall", *ENDS), "generated walls are leaning-wall"),
+        (("climb", "small-wall:x", *ENDS), "seed of a wall must be a whole number, got 'x'"),
+        ((*SMALL, *ENDS, "--lean", "0.3"), "--lean"),
         ((*SMALL, "--from", "9,9,9", "--to", "height:1"), "start.near"),
         ((*SMALL, "--from", "height:0.75", "--to", "height:9"), "goal.height"),
         ((*SMALL, "--from", "nan,0,0", "--to", "height:1"), "--from"),
