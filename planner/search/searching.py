@@ -203,8 +203,9 @@ class _Search:
         bounds = self._table.bounds(lifts)
         self._bound = self._ceiling = float(np.max(self._ground.tops(self._table), initial=0.0))
         self._tried = float(np.max(bounds, initial=0.0))
-        some = lifts.of(np.arange(min(len(bounds), settings.examples)))
-        self._table = self._table.reordered(some, float(np.quantile(bounds, 0.99)))
+        if len(bounds):
+            some = lifts.of(np.arange(min(len(bounds), settings.examples)))
+            self._table = self._table.reordered(some, float(np.quantile(bounds, 0.99)))
 
     def _decide(self, multiple: float) -> Decision:
         """Decide whether a climb has a least load factor, or leave it open when time is over.

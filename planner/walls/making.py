@@ -288,6 +288,11 @@ def _given_places(source: WallSource) -> tuple[list[HandOnHold], list[HandParts]
             )
         if isinstance(outcome, InvalidInputError):
             raise outcome.within(f"more_places[{i}]")
+        if not (outcome.holding.any() or outcome.palm.layers):
+            raise InvalidInputError(
+                "no tile is on the rock here; give the pose in W of a hand on this rock",
+                field=f"more_places[{i}].pose",
+            )
         at = outcome.seating.pose
         hands.append(
             replace(

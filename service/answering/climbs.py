@@ -283,18 +283,15 @@ def _bodies_near(name: str, end: requests.ClimbEnd, origins: Array) -> NDArray[n
             )
         return np.asarray(there)
     assert end.height is not None
-    there, words = heights >= end.height, "at least"
+    # the other height is rounded so that it is accepted
+    there, words = heights >= end.height, "at least so high; the highest is"
+    other = math.floor(100.0 * heights.max()) / 100.0
     if name == "start":
-        there, words = heights <= end.height, "at most"
+        there, words = heights <= end.height, "at most so high; the lowest is"
+        other = math.ceil(100.0 * heights.min()) / 100.0
     if not there.any():
-        # rounded so that either number is a height that is accepted
-        low, high = (
-            math.ceil(100.0 * heights.min()) / 100.0,
-            math.floor(100.0 * heights.max()) / 100.0,
-        )
         raise InvalidInputError(
-            f"no pose of the body is {words} so high; they are {low:.2f} m to {high:.2f} m high, "
-            f"got {end.height:g} m",
+            f"no pose of the body is {words} {other:.2f} m high, got {end.height:g} m",
             field=f"{name}.height",
         )
     return np.asarray(there)

@@ -108,7 +108,12 @@ def climb_end(
         raise InvalidInputError(
             f"must be x,y,z or height:Z in finite metres, or a stance, got {text!r}", field=field
         ) from None
-    stance = read(text).stance
+    try:
+        stance = read(text).stance
+    except InvalidInputError as error:
+        # the reader names the argument of other commands
+        error.field = field if error.field == "STANCE" else f"{field}: {error.field}"
+        raise
     hands = []
     for i, hand in enumerate(stance.hands):
         if hand.pose is None:

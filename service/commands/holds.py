@@ -144,7 +144,7 @@ def holds_command(
     hand: ParameterTable | None,
     picture: Path | None,
     as_json: bool,
-) -> None:
+) -> int:
     """Propose holds on ROCK, a mesh in metres (of a scan, `crux rock` makes one).
 
     In place of a file, ROCK may be a generated wall: leaning-wall, blocked-wall or small-wall, each
@@ -154,6 +154,8 @@ def holds_command(
     the mean normal of the rock under its palm. Holds are sorted by the pull-off, with every other
     force and moment zero, that is held in nine of ten samples of where the hand comes to the rock.
     Each hold has a `place`, for the hand of a request whose rock this is.
+
+    Exit status: 3 if nothing holds.
     """
     from hand_models import fixed_wrist, parameters
     from hand_models.rock import Mesh
@@ -258,6 +260,7 @@ def holds_command(
         out = tables.console()
         tables.print_holds(result, trials, found, SHOWN_HOLDS, out)
         out.print(f"{output} (in m, rad, N)", soft_wrap=True)
+    return tables.ExitStatus.DONE if found else tables.ExitStatus.OVERLOADED
 
 
 def _keep(

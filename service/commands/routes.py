@@ -118,7 +118,7 @@ sought_options = options.asked_for(
         help="By which another climb may be better.",
     ),
     _above("--at-least", "Load factor that is enough in all stages."),
-    _above("--time", "After which the best climb so far is taken [s].", most=1e6),
+    _above("--time", "Of the search, after which the best climb so far is taken [s].", most=1e6),
     click.option("--surface", default="rock", show_default=True, help="A preset's name."),
     _above("--spacing", "Of the points at which hands are tried [m].", most=10.0),
     _above("--body-spacing", "Of the places of the body [m].", most=10.0),

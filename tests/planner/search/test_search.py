@@ -32,6 +32,16 @@ def solved(seed, count, rows):
     return all_factors(some_wall(seed, count, rows)[0])
 
 
+def test_a_wall_that_no_three_hands_can_hold_has_no_climb():
+    wall, start, goal = some_wall(3, 14, 5)
+    wall = replace(wall, apart=np.zeros_like(wall.apart))
+    found = search(wall, start, goal)
+    assert found.finished
+    assert found.states == ()
+    assert found.bound == -np.inf
+    assert check_bound(climb_certificate(wall, start, goal, found)).proven
+
+
 def check_climb(wall, start, goal, found):
     """One move between two states, each within reach, from the start to the goal."""
     for state in found.states:

@@ -107,6 +107,11 @@ def test_given_placements_and_bodies_come_last():
     loose = replace(source, more_places=[replace(given, wrist="compliant")])
     with pytest.raises(UnsupportedError, match=r"more_places\[0\]\.wrist: must have a fixed"):
         wall_of(loose, loose.poses())
+    far = Pose(given.pose.position + np.array([0.0, 0.0, 9.0]), given.pose.rotation)
+    off_rock = replace(given, pose=far, hold_in_hand=None, hold_pose=source.rock_pose)
+    off = replace(source, more_places=[given, off_rock])
+    with pytest.raises(InvalidInputError, match=r"more_places\[1\]\.pose: no tile is on the rock"):
+        wall_of(off, off.poses())
 
 
 def test_a_wall_is_read_as_it_was_written(tmp_path):

@@ -108,8 +108,8 @@ def test_an_end_is_the_bodies_that_it_names() -> None:
     assert found("goal", near=(0.0, 0.2, 3.0)) == [2, 5]
     assert found("goal", near=(0.0, 0.2, 3.0), radius=0.25) == [2]
     for name, end, words in (
-        ("start", {"height": 0.5}, r"at most so high; they are 1.00 m to 3.00 m high, got 0.5 m"),
-        ("goal", {"height": 3.5}, r"at least so high"),
+        ("start", {"height": 0.5}, r"at most so high; the lowest is 1.00 m high, got 0.5 m"),
+        ("goal", {"height": 3.5}, r"at least so high; the highest is 3.00 m high, got 3.5 m"),
         ("goal", {"near": (0.0, 0.0, 4.0)}, r"within 0.3 m; the nearest is 1.00 m away"),
     ):
         with pytest.raises(InvalidInputError, match=words) as caught:

@@ -66,6 +66,14 @@ def test_an_end_that_is_no_place_is_refused(text):
         sought(start=text)
 
 
+def test_a_stance_that_cannot_be_read_is_named_by_its_option(tmp_path):
+    file = tmp_path / "stance.json"
+    file.write_text('{"v": 1, "stance": {"body": 3}}')
+    for text, said in (("no-stance", "--to: no such file"), (str(file), "--to: stance")):
+        with pytest.raises(InvalidInputError, match=said):
+            sought(goal=text)
+
+
 @pytest.mark.parametrize("text", ["-1%", "nan", "1001%", "five", ""])
 def test_a_part_that_is_none_is_refused(text):
     with pytest.raises(InvalidInputError, match="--best-within"):
@@ -106,9 +114,9 @@ def test_an_end_that_a_refusal_names_is_accepted():
 
     for ends, end in (((0.0, 9.0), 0), ((9.0, 9.0), 1)):
         words = said(*ends).split()
-        low, high = (float(words[i]) for i in (words.index("are") + 1, words.index("to") + 1))
+        height = float(words[words.index("high,") - 2])
         ends = [9.0, -9.0]
-        ends[end] = (low, high)[end]
+        ends[end] = height
         assert said(*ends) == ""
 
 

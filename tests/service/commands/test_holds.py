@@ -225,7 +225,8 @@ def test_where_no_hand_comes_to_rest_the_hint_says_so(tmp_path, capfd):
     grid = ["--spacing", "1", "--angles", "1", "--outer-rotation", "0"]
     options = ["-o", str(output), *grid, "--robust", "0", "--workers", "1"]
     for placing, rests in (("contact", False), ("given", True)):
-        run_command_line(["holds", str(flat), *options, "--placing", placing])
+        status = run_command_line(["holds", str(flat), *options, "--placing", placing])
+        assert status == (0 if rests else 3)
         told = " ".join(capfd.readouterr().out.split())
         assert ("nothing holds: closed hands come to rest nowhere" in told) != rests
         assert "does z of the file point" not in told
