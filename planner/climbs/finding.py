@@ -6,7 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -145,23 +145,25 @@ class _Finder:
         self._refused = Counter[tuple[str | None, KnotPhase]]()
         self._reasons = dict[tuple[str | None, KnotPhase], str]()
         self._best: _Planned | None = None
-        self._bound, self._unheld = np.inf, 0
+        self._bound = np.inf
+        # below one, the hands do not hold the robot at all
+        self._floor = 1.0
         self._begun = time.perf_counter()
         self._seconds = dict.fromkeys(("search", "moves", "stages", "changes"), 0.0)
         self._before: Climb | None = None
-        self._checks = MoveChecks(maker.wall, maker.limits.utilisation)
+        self._checks = MoveChecks(maker.wall, maker.limits)
 
     def find(self, start: Ends, goal: Ends, within: float, at_least: float | None) -> FoundClimb:
         """Search and plan until the climb is good enough, nothing is left, or the time is over."""
         found, share, ended = None, 0.7, False
         while not ended:
+            bounded = np.isfinite(self._bound)
             found = self._search(start, goal, within, at_least, share)
             if not found.states:
                 break
-            missing = {pair for pair in pairwise(found.states) if not self._checks.passes(*pair)}
-            if missing:
-                self._blocked |= missing
-                self._unheld += len(missing)
+            # the first search bounds all climbs; those after it ask which moves pass
+            pairs = [*pairwise(found.states), *zip(found.states, found.states, strict=True)]
+            if not bounded and not all(self._checks.passes(*pair) for pair in pairs):
                 continue
             try:
                 planned = self._plan(found)
@@ -188,8 +190,10 @@ class _Finder:
                 goal,
                 within=within,
                 at_least=at_least,
+                floor=self._floor,
                 seconds=None if left is None else share * left,
                 blocked=frozenset(self._blocked),
+                passes=self._checks.passes if np.isfinite(self._bound) else None,
                 progress=lambda _, __, bound, ___: self._report("search", bound),
             )
         except DeadlineError:
@@ -226,13 +230,26 @@ class _Finder:
         return _Planned(found, ClimbStep.each(states), climb, result)
 
     def _climb(self, states: Sequence[State], after: Climb | None) -> Climb:
-        return plan_climb(
-            self._maker.route(ClimbStep.each(states)),
-            self._settings,
-            lambda done, total: self._report("moves", done=done, total=total),
-            known=self._maker.branches,
-            after=after,
-        )
+        """Plan moves, after those of another climb or from some joint angles at the start."""
+        best: Climb | None = None
+        own = () if after is not None else self._checks.joints(states[0])
+        starts = chain([None], own)
+        for joints in starts:
+            climb = plan_climb(
+                self._maker.route(ClimbStep.each(states), joints),
+                self._settings,
+                lambda done, total: self._report("moves", done=done, total=total),
+                known=self._maker.branches,
+                after=after,
+            )
+            if best is None or len(climb.knots) > len(best.knots):
+                best = climb
+            failure = climb.failure
+            # the joints at the start last at least till the body has shifted
+            if failure is None or failure.move > 1 or failure.phase not in ("start", "shift"):
+                return climb
+        assert best is not None
+        return best
 
     def _leave_out(self, failure: Failure, step: ClimbStep) -> None:
         """Leave a move that fails out of further searches."""
@@ -255,7 +272,7 @@ class _Finder:
         wall, best = self._maker.wall, self._best
         if best is None:
             ended = found.finished and not found.states
-            proven = self._bound <= (-np.inf if at_least is None else at_least)
+            proven = self._bound <= max(self._floor, at_least or 0.0)
             nothing: ClimbStatus = ("none" if proven else "blocked") if ended else "unknown"
             return FoundClimb(
                 status=nothing,

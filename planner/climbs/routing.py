@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple, Self
 
@@ -91,14 +91,16 @@ class RouteMaker:
         self._places = {_key(each.pose): i for i, each in enumerate(wall.places)}
         self._bodies = {_key(each): i for i, each in enumerate(wall.bodies)}
 
-    def route(self, steps: Sequence[ClimbStep]) -> Route:
-        """Return the route of moves, from the first state on."""
+    def route(self, steps: Sequence[ClimbStep], joints: Mapping[str, Array] | None = None) -> Route:
+        """Return the route of moves, from the first state on, perhaps at joint angles [rad]."""
         wall, first = self.wall, steps[0].shifts[0]
         hands = [self._hand(limb, p) for limb, p in enumerate(first.members)]
         last = steps[-1]
         return Route(
             name=self._name,
-            start=Stance(tuple(hands), wall.bodies[first.body], robot=wall.robot, joints="solve"),
+            start=Stance(
+                tuple(hands), wall.bodies[first.body], robot=wall.robot, joints=joints or "solve"
+            ),
             moves=tuple(self._move(step) for step in steps if step.lift is not None),
             end=None if last.lift is not None else wall.bodies[last.shifts[-1].body],
             limits=self.limits,

@@ -303,7 +303,8 @@ def _clear_of_rock(scene: CollisionScene, limb: str, rock: Rock, bodies: Sequenc
     # the last joint moves the hand and what is next to it, which may touch
     free = np.flatnonzero(capsules.steps < capsules.steps.max())
     along = np.linspace(0.0, 1.0, 5)[:, None]
-    margin = scene_number("motion", "margin_at_hold")
+    # room also for the way to the next pose of the body, and for what lies between the points
+    margin = 2.0 * scene_number("motion", "margin_at_hold")
     # a limb that is deeper in the rock somewhere goes through its surface elsewhere
     far = 2.0 * float((scene.radii[own[free]] + margin).max())
     into = [rock.pose.inverse() @ body for body in bodies]

@@ -19,7 +19,7 @@ from planner.search.lifts import Lifts
 from planner.search.programs import Programs
 from planner.search.settings import SEARCH_SETTINGS
 from planner.search.wall import State
-from planner.search.ways import Blocked, Way, Ways
+from planner.search.ways import Blocked, Passes, Way, Ways
 
 __all__ = ["Decision"]
 
@@ -32,14 +32,19 @@ class Decision:
     lifts : Lifts
         All lifts that may have it.
     programs : Programs
-    blocked : frozenset of pairs of State
+    moves : frozenset of pairs of State, and callable
+        Those that may not be made; and whether one may be.
+    attempts : float
+        Parents of a lift that are tried over four hands.
+    barred : set of Way, optional
+        Ways that are left out.
     """
 
     def __init__(
         self,
         lifts: Lifts,
         programs: Programs,
-        blocked: Blocked,
+        moves: tuple[Blocked, Passes | None],
         attempts: float,
         barred: set[Way] | None = None,
     ) -> None:
@@ -48,8 +53,7 @@ class Decision:
         self._lifts, self._nodes, self._programs = lifts, lifts.nodes, programs
         self._least = lifts.multiple * (1.0 - 0.1 * SEARCH_SETTINGS.exact)
         self._factors = np.full(len(lifts), np.nan)
-        self._blocked = blocked
-        self._ways = Ways(lifts, programs, blocked, set() if barred is None else barred)
+        self._ways = Ways(lifts, programs, moves, set() if barred is None else barred)
         self._turn = count()
         self._queues = [list[tuple[float, int, Indices]](), list[tuple[float, int, Indices]]()]
         self.partial = False
@@ -255,14 +259,15 @@ class Decision:
                 return way
             if way.before >= 0:
                 lift = self._ways.state(way.before)
-                turns = [(lift, between[0]), (states[-2], lift), (states[-2], between[0])]
-                if lift in self._ways.stopped or any(turn in self._blocked for turn in turns):
+                turns = [(lift, lift), (lift, between[0])]
+                turns += [(states[-2], lift), (states[-2], between[0])]
+                if not all(self._ways.passes(*turn) for turn in turns):
                     self._bar(way)
                     return way
             states += between
             if way.after >= 0:
                 after = self._ways.state(way.after)
-                if (between[-1], after) in self._blocked:
+                if not self._ways.passes(between[-1], after):
                     self._bar(way)
                     return way
                 states.append(after)

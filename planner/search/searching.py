@@ -18,7 +18,7 @@ from planner.search.lifts import Ground, Lifts
 from planner.search.programs import Programs
 from planner.search.settings import SEARCH_SETTINGS
 from planner.search.wall import Ends, State, Wall
-from planner.search.ways import Blocked
+from planner.search.ways import Blocked, Passes
 
 __all__ = ["SearchProgress", "search"]
 
@@ -33,8 +33,10 @@ def search(
     *,
     within: float = 0.0,
     at_least: float | None = None,
+    floor: float = 0.0,
     seconds: float | None = None,
     blocked: Blocked = frozenset(),
+    passes: Passes | None = None,
     progress: SearchProgress | None = None,
 ) -> Found:
     """Find the climb with the largest least load factor, and bound every other.
@@ -48,26 +50,32 @@ def search(
     at_least : float, optional
         Least load factor that is enough, and without which none counts; by default the best climb
         is looked for.
+    floor : float
+        Load factor below which no state is passed.
     seconds : float, optional
         Time after which the search ends with what it has, as it does at a deadline of
         `planner.deadline` [s].
     blocked : frozenset of pairs of State
         Moves that may not be made, which the climb goes round: a state and the next, or the one
         after it. A state twice may not be passed. The bound is that of the statics all the same.
+    passes : callable, optional
+        Returns whether a state may be followed by another; twice the same, whether it may be passed
+        at all. It is asked of climbs that the statics leave; its word does not count for the bound.
     progress : callable, optional
         Called with a phase, the least load factor so far, the bound and the programs solved.
 
     Raises
     ------
     InvalidInputError
-        If ``within``, ``at_least`` or ``seconds`` is out of range.
+        If ``within``, ``at_least``, ``floor`` or ``seconds`` is out of range.
     LimitError
         If too many lifts would have to be kept before any climb is found.
     """
-    for name, value in (("within", within), ("at_least", at_least), ("seconds", seconds)):
+    numbers = {"within": within, "at_least": at_least, "floor": floor, "seconds": seconds}
+    for name, value in numbers.items():
         if value is not None and not 0.0 <= value < np.inf:
             raise InvalidInputError(f"must be at least 0, got {value:g}", field=name)
-    search_of = _Search(wall, (start, goal), blocked, progress, seconds)
+    search_of = _Search(wall, (start, goal), (blocked, passes), progress, seconds, floor)
     return search_of.found(within, at_least)
 
 
@@ -82,13 +90,15 @@ class _Search:
         self,
         wall: Wall,
         ends: tuple[Ends, Ends],
-        blocked: Blocked,
+        moves: tuple[Blocked, Passes | None],
         progress: SearchProgress | None,
         seconds: float | None,
+        floor: float,
     ) -> None:
+        self._floor = floor
         self._started, self._said, self._phase = time.perf_counter(), -np.inf, ""
         self._end = np.inf if seconds is None else self._started + seconds
-        self._ground, self._blocked, self._progress = Ground(wall, ends), blocked, progress
+        self._ground, self._moves, self._progress = Ground(wall, ends), moves, progress
         self._table, self._programs = wall.screening, Programs(wall.screening)
         self._states: tuple[State, ...] = ()
         self._least, self._bound = -np.inf, np.inf
@@ -137,7 +147,8 @@ class _Search:
             self._doubt = multiple
         elif decided.exhausted:
             # below the least load factor that is asked for, nothing counts
-            self._ceiling = -np.inf if multiple == at_least else multiple
+            lowest = decided.multiple == self._floor and not self._states
+            self._ceiling = -np.inf if lowest or multiple == at_least else multiple
             if not decided.hindered:
                 self._prove(decided, multiple)
         if self._states and (decided.route or (decided.exhausted and not decided.partial)):
@@ -149,7 +160,7 @@ class _Search:
         below = self._tried < self._ceiling
         multiple = min(settings.step * self._ceiling, self._tried)
         multiple *= settings.first_step if below else 1.0
-        return multiple if multiple > settings.lowest else 0.0
+        return multiple if multiple > max(settings.lowest, self._floor) else self._floor
 
     def _enough(self, at_least: float) -> Decision:
         """Look for a climb with a given least load factor, from larger ones down to it."""
@@ -213,8 +224,9 @@ class _Search:
         Before the first climb is known, it is also left open after some steps, for a lower one.
         """
         self._tried = multiple
-        few = np.isfinite(self._levels).any() and multiple > 0.0
-        return self._run(multiple, self._levels if few else None, SEARCH_SETTINGS.first_steps)
+        few = np.isfinite(self._levels).any() and multiple > self._floor
+        steps = SEARCH_SETTINGS.first_steps if multiple > self._floor else np.inf
+        return self._run(multiple, self._levels if few else None, steps)
 
     def _run(
         self, multiple: float, levels: Array | None, steps: float, whole: bool = True
@@ -232,7 +244,7 @@ class _Search:
         # of all lifts, stances are solved where both ends meet, and all only if some fail there
         attempts = 0.0 if levels is None else float(SEARCH_SETTINGS.attempts)
         self._report(f"climbs at {multiple:.3g}")
-        decision = Decision(lifts, self._programs, self._blocked, attempts)
+        decision = Decision(lifts, self._programs, self._moves, attempts)
         while not decision.ended and steps > 0:
             self._check()
             decision.advance()
@@ -243,7 +255,7 @@ class _Search:
                 lifts.nodes[:] = 0
                 attempts = np.inf if levels is None else attempts
                 barred = decision.barred
-                decision = Decision(lifts, self._programs, self._blocked, attempts, barred)
+                decision = Decision(lifts, self._programs, self._moves, attempts, barred)
         decision.partial = levels is not None
         self._relearn(multiple)
         return decision

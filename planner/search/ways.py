@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import combinations
 from typing import NamedTuple
 
@@ -14,10 +15,13 @@ from planner.search.programs import Programs
 from planner.search.settings import SEARCH_SETTINGS
 from planner.search.wall import State
 
-__all__ = ["Blocked", "Way", "Ways"]
+__all__ = ["Blocked", "Passes", "Way", "Ways"]
 
 Blocked = frozenset[tuple[State, State]]
 """Moves that may not be made: a state and a later one; a state twice may not be passed at all."""
+
+Passes = Callable[[State, State], bool]
+"""Returns whether a state may be followed by another; twice the same, whether it may be passed."""
 
 Bodies = NDArray[np.bool_]
 
@@ -45,7 +49,8 @@ class Ways:
     ----------
     lifts : Lifts
     programs : Programs
-    blocked : frozenset of pairs of State
+    moves : frozenset of pairs of State, and callable
+        Those that may not be made; and whether one may be.
     barred : set of Way
         Ways that blocked moves leave out.
 
@@ -56,11 +61,16 @@ class Ways:
     """
 
     def __init__(
-        self, lifts: Lifts, programs: Programs, blocked: Blocked, barred: set[Way]
+        self,
+        lifts: Lifts,
+        programs: Programs,
+        moves: tuple[Blocked, Passes | None],
+        barred: set[Way],
     ) -> None:
-        self._lifts, self._programs, self._blocked = lifts, programs, blocked
+        self._lifts, self._programs = lifts, programs
+        self._blocked, self._passes = moves
         self._least = lifts.multiple * (1.0 - 0.1 * SEARCH_SETTINGS.exact)
-        self.stopped = {first for first, second in blocked if first == second}
+        self.stopped = {first for first, second in self._blocked if first == second}
         self.barred, self.hindered = barred, len(barred) > 0
         self._bad, self._good = set[State](), set[State]()
         self._between = dict[Way, list[State]]()
@@ -110,7 +120,7 @@ class Ways:
                         path.append(back[path[-1]])
                     return path[::-1]
                 for other in np.flatnonzero(ground.beside[body] & allowed & ~seen).tolist():
-                    if (State(body, members), State(other, members)) in self._blocked:
+                    if not self.passes(State(body, members), State(other, members)):
                         self.hindered = True
                         continue
                     seen[other] = True
@@ -130,9 +140,18 @@ class Ways:
         while True:
             states = [State(body, members) for body in self._shift(members, starts, goals)]
             low = [each for each in states if self._programs.stance(each) < self._least]
-            if not low:
+            unfit = [] if low else [each for each in states if not self.passes(each, each)]
+            if not low and not unfit:
                 return states
+            self.stopped.update(unfit)
             self._bad.update(low)
+
+    def passes(self, before: State, after: State) -> bool:
+        """Return whether a move may be made, or a state twice be passed."""
+        barred = before in self.stopped or after in self.stopped
+        if barred or (before, after) in self._blocked:
+            return False
+        return self._passes is None or self._passes(before, after)
 
     def standing(self) -> tuple[State, ...]:
         """Return a climb that only shifts the body, if there is one."""

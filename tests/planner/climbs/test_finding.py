@@ -79,9 +79,9 @@ def test_a_move_needs_the_others_to_hold_what_its_closed_hand_does():
     assert MoveChecks(wall).passes(whole, lift)
     assert MoveChecks(wall).passes(lift, whole)
     # within a small part of all limits the others do not hold it
-    assert not MoveChecks(wall, 0.2).passes(whole, lift)
+    assert not MoveChecks(wall, Limits(utilisation=0.2)).passes(whole, lift)
     # the body is shifted on all hands, which has no such check
-    assert MoveChecks(wall, 0.2).passes(whole, State(4, START))
+    assert MoveChecks(wall, Limits(utilisation=0.2)).passes(whole, State(4, START))
 
 
 def test_detours_are_states_of_the_wall_one_after_the_other():

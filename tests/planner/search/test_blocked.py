@@ -34,3 +34,29 @@ def test_a_blocked_move_is_gone_round_and_leaves_the_bound(at, monkeypatch):
     found = search(wall, start, goal, blocked=frozenset([tuple(State(*each) for each in blocked)]))
     np.testing.assert_allclose(found.least, around, rtol=1e-7)
     assert found.bound >= best * (1.0 - 1e-9)
+
+
+def test_moves_that_do_not_pass_are_gone_round_as_blocked_ones_are():
+    climb = random_climb(34, placements=5, bodies=3, reach=0.6)
+    factors = {state: solved_state(climb, state)[0] for state in every_state(climb)}
+    _, route = best_climb(climb, factors)
+    wall, start, goal = wall_of(climb)
+    for at in (0, 2, 5):
+        first, second = (State(*each) for each in list(pairwise(route))[at])
+        pair = first, second
+        around = search(wall, start, goal, blocked=frozenset([pair]))
+        asked = search(wall, start, goal, passes=lambda a, b, pair=pair: (a, b) != pair)
+        np.testing.assert_allclose(asked.least, around.least, rtol=1e-9)
+        assert asked.bound >= around.bound * (1.0 - 1e-9)
+
+
+def test_below_the_floor_nothing_counts_and_above_it_nothing_changes():
+    climb = random_climb(34, placements=5, bodies=3, reach=0.6)
+    factors = {state: solved_state(climb, state)[0] for state in every_state(climb)}
+    best, _ = best_climb(climb, factors)
+    wall, start, goal = wall_of(climb)
+    np.testing.assert_allclose(search(wall, start, goal, floor=0.9 * best).least, best, rtol=1e-7)
+    over = search(wall, start, goal, floor=1.01 * best)
+    assert over.finished
+    assert not over.states
+    assert best <= over.bound <= 1.01 * best * (1.0 + 1e-9)
