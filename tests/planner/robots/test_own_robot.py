@@ -341,7 +341,7 @@ def test_serve_and_query_a_robot_and_a_hand(
     hand = tmp_path / "hand.toml"
     hand.write_text(entry_toml("structure", "held_mass", 20.0))
     assert set(served.ready["keys"]) == {
-        service_key("arms", name) for name in dispatch.SERVICES_BY_NAME
+        service_key("arms", name) for name in (*dispatch.SERVICES_BY_NAME, "cancel")
     }
     flags = [*flags_to(served), "--robot", str(file), "--hand", str(hand)]
     assert run_command_line(["query", stance_file(hanging(file)), *flags]) == 0

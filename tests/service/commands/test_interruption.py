@@ -166,9 +166,9 @@ def test_a_full_disk_leaves_no_half_file(tmp_path):
     status, error = limited("plan", "wall", "--plot", str(picture), size=10_000)
     assert (status, error) == (FAILED, f"crux: cannot write {picture}: File too large\n")
     status, error = limited("route", "six-moves", "-o", str(tmp_path), size=10_000)
-    picture = tmp_path / "margin.png"
-    assert (status, error) == (FAILED, f"crux: cannot write {picture}: File too large\n")
-    assert [path.name for path in tmp_path.iterdir()] == ["stages.csv"]
+    file = tmp_path / "trajectory.jsonl"
+    assert (status, error) == (FAILED, f"crux: cannot write {file}: File too large\n")
+    assert [path.name for path in tmp_path.iterdir()] == []
 
 
 @pytest.mark.parametrize("more", [pytest.param([], marks=pytest.mark.slow), ["--json"]])

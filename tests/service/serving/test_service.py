@@ -521,7 +521,7 @@ def test_a_log_line_a_question() -> None:
         bad = msgspec.structs.replace(plan_request(), confidence=0.99, id="bad")
         with pytest.raises(ServiceError):
             client.plan(bad)
-    _, *lines = server.stop(signal.SIGTERM)[1].splitlines()
+    _, _, *lines = server.stop(signal.SIGTERM)[1].splitlines()
     first, second = (json.loads(line) for line in lines)
     assert (first["id"], first["status"], first["key"]) == ("wall", "optimal", PLAN)
     assert first["client"] == second["client"]
@@ -544,5 +544,5 @@ def test_a_log_that_nobody_reads_keeps_nobody_waiting() -> None:
     server.process.send_signal(signal.SIGTERM)
     assert server.process.wait(PATIENCE) == 0
     lines = server.process.stderr.read().splitlines()
-    assert all(json.loads(line)["status"] == "malformed" for line in lines[1:-1])
+    assert all(json.loads(line)["status"] == "malformed" for line in lines[2:-1])
     assert len(lines) < 100
