@@ -183,6 +183,7 @@ def climb_reply(
     return ClimbReply(
         id=request.id,
         name=request.name,
+        robot=wall.robot.name,
         status=found.status,
         least=found.least,
         bound=_finite(found.bound),
@@ -193,6 +194,7 @@ def climb_reply(
         about=found.about,
         route=None if found.route is None else route_request(request, found.route),
         stages=[] if found.result is None else stage_replies(found.result),
+        knots=None if found.climb is None else len(found.climb.knots),
         placements=len(wall.places),
         bodies=len(wall.bodies),
         programs=found.found.programs,

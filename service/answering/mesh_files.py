@@ -12,7 +12,7 @@ import msgspec
 
 from hand_models.base import BoundedStore, InvalidInputError, errors_under
 from hand_models.rock import read_mesh
-from service.requests import Hand, Hold, Mesh, PlanRequest, Request, RouteRequest
+from service.requests import ClimbRequest, Hand, Hold, Mesh, PlanRequest, Request, RouteRequest
 
 __all__ = ["MeshFiles"]
 
@@ -40,7 +40,7 @@ class MeshFiles:
         Parameters
         ----------
         request : Request
-            Request of any kind; only plan requests and routes name files.
+            Request of any kind; only plans, routes and climbs name files.
 
         Returns
         -------
@@ -54,6 +54,8 @@ class MeshFiles:
             ``field`` is a path in the request.
         """
         replace = msgspec.structs.replace
+        if isinstance(request, ClimbRequest) and isinstance(request.rock, Mesh):
+            request = replace(request, rock=self._filled(request.rock, "rock"))
         if isinstance(request, (PlanRequest, RouteRequest)):
             stance = request.stance
             rocks = {

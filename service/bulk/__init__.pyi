@@ -6,6 +6,7 @@ from .columns import (
     Column as Column,
     TableRow as TableRow,
     chosen_columns as chosen_columns,
+    climb_columns as climb_columns,
     columns_of as columns_of,
     route_columns as route_columns,
     row_of as row_of,

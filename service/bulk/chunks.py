@@ -20,7 +20,7 @@ import msgspec
 
 from hand_models.base import DISTRIBUTION_NAME, BoundedStore, CruxError, installed_version
 from hand_models.parameters import ParameterTable
-from service.requests import PlanRequest, RouteRequest
+from service.requests import ClimbRequest, PlanRequest, RouteRequest
 from service.wire import Answer, Format, MalformedError, ServiceName
 
 if TYPE_CHECKING:
@@ -86,10 +86,10 @@ class Setting(NamedTuple):
         Package versions of the client, which workers compare with their versions; None if workers
         use the same installation.
     kind : str
-        Type of all requests: `ServiceName.PLAN` or `ServiceName.ROUTE`.
+        Type of all requests: `ServiceName.PLAN`, `ServiceName.ROUTE` or `ServiceName.CLIMB`.
     make : callable or None
         Called once in each worker; returns a function that maps an encoded request to its `Answer`.
-        This function replaces the handlers of plans and routes.
+        This function replaces the handlers of requests.
     """
 
     robot: RobotFile | None = None
@@ -184,8 +184,12 @@ def _check_versions(there: dict[str, str | None]) -> None:
         )
 
 
-def _revised(setting: Setting, request: PlanRequest | RouteRequest) -> PlanRequest | RouteRequest:
+def _revised(
+    setting: Setting, request: PlanRequest | RouteRequest | ClimbRequest
+) -> PlanRequest | RouteRequest | ClimbRequest:
     """Return a request as it is to be answered."""
+    if isinstance(request, ClimbRequest):
+        return request
     explain = request.explain if setting.explain is None else setting.explain
     if not setting.brief or isinstance(request, RouteRequest):
         return msgspec.structs.replace(request, explain=explain)

@@ -1,4 +1,4 @@
-"""Columns of the tables of plans and routes, with units, and the conversion of replies into rows.
+"""Columns of tables of plans, routes and climbs, with units, and conversion of replies into rows.
 
 If a column has a unit, its name ends in the unit, as in ``front_left_fx_N``.
 """
@@ -20,6 +20,7 @@ __all__ = [
     "Column",
     "TableRow",
     "chosen_columns",
+    "climb_columns",
     "columns_of",
     "route_columns",
     "row_of",
@@ -44,7 +45,7 @@ class Column(NamedTuple):
         Description of the values, in a few words.
     path : tuple of str or int
         Keys and indices of the value in a decoded reply; by default the name alone. Hands are keyed
-        by limb here, and the hardest stage of a route is ``hardest``.
+        by limb here, the hardest stage of a route is ``hardest``, and stages and moves are counted.
     """
 
     name: str
@@ -55,7 +56,7 @@ class Column(NamedTuple):
 
     @property
     def is_index(self) -> bool:
-        """True for the first column of plans and routes, the index of the request."""
+        """True for the first column of all but sweeps, the index of the request."""
         return self.name == "index"
 
 
@@ -67,9 +68,9 @@ class TableRow(msgspec.Struct):
     values : list
         Values of all columns except ``index``.
     status : str or None
-        Status of the plan or route; None for an error.
+        Status of the plan, route or climb; None for an error.
     error : ErrorDetail or None
-        The error; None for a plan or route.
+        The error; None for any other answer.
     """
 
     values: list[Any]
@@ -100,7 +101,7 @@ def _columns(limbs: Sequence[str], explained: bool) -> Iterator[Column]:
     yield Column("status", "text", "", "of the plan; empty for an error")
     yield Column("utilisation", "float", "1", "the largest of any limit")
     yield from _load_factor("where the request wants it, and it is bounded", "it")
-    yield from _limiting()
+    yield from _limiting("limiting")
     yield Column("verified", "bool", "", "whether the plan has passed its independent check")
     for limb in limbs:
         hand, meaning = ("hands", limb), "the largest of the hand's limits"
@@ -151,8 +152,37 @@ def _route_columns() -> Iterator[Column]:
         yield Column(f"crux_{part}", "text", "", meaning, ("hardest", part))
     yield Column("utilisation", "float", "1", "of the crux: the largest of any limit")
     yield from _load_factor("the least of all stages, where it is bounded", "any of them")
-    yield from _limiting()
+    yield from _limiting("limiting")
     yield Column("warnings", "text", "", "with '; ' between them")
+    yield from _failed()
+
+
+def climb_columns() -> tuple[Column, ...]:
+    """Return all columns of a table of climbs that are searched for, one row for each rock."""
+    return tuple(_climb_columns())
+
+
+def _climb_columns() -> Iterator[Column]:
+    yield from _asked()
+    yield Column("name", "text", "", "the climb's")
+    yield Column("robot", "text", "", "name of the robot")
+    meaning = "found, not_proven, none, blocked or unknown; empty for an error"
+    yield Column("status", "text", "", meaning)
+    yield Column("least", "float", "1", "least load factor of all stages; empty without a climb")
+    yield Column("bound", "float", "1", "no other climb has a larger least load factor")
+    yield Column("gap", "float", "1", "how much larger the bound is, as a part of the least")
+    yield Column("moves", "int", "1", "of limbs, in the climb")
+    yield Column("knots", "int", "1", "of the climb's trajectory")
+    for name, what in (("placements", "of hands"), ("bodies", "poses of the body")):
+        yield Column(name, "int", "1", f"{what}, of which climbs were made")
+    for part, meaning in (
+        ("stage", "the stage with the least load factor, from zero"),
+        ("move", "its move, from one; zero is the start"),
+    ):
+        yield Column(f"deciding_{part}", "int", "1", meaning, ("deciding", part))
+    for part, meaning in (("phase", "its part of the move"), ("limb", "that moves in it")):
+        yield Column(f"deciding_{part}", "text", "", meaning, ("deciding", part))
+    yield from _limiting("deciding", "limiting")
     yield from _failed()
 
 
@@ -168,15 +198,15 @@ def _load_factor(meaning: str, which: str) -> Iterator[Column]:
     yield Column("load_factor_status", "text", "", meaning)
 
 
-def _limiting() -> Iterator[Column]:
+def _limiting(*path: str) -> Iterator[Column]:
     for part in LimitName.__struct_fields__:
         meaning = f"{part} of the limit that is used most"
-        yield Column(f"limiting_{part}", "text", "", meaning, ("limiting", part))
+        yield Column(f"limiting_{part}", "text", "", meaning, (*path, part))
 
 
 def _failed() -> Iterator[Column]:
     for part in ("kind", "field", "message"):
-        meaning = f"{part} of the error; empty for a plan"
+        meaning = f"{part} of the error; empty without one"
         yield Column(f"error_{part}", "text", "", meaning, ("error", part))
 
 
@@ -228,7 +258,7 @@ def row_of(payload: bytes, columns: Sequence[Column]) -> TableRow:
     Parameters
     ----------
     payload : bytes
-        JSON of a whole or brief plan reply, of a route reply, or of an error reply.
+        JSON of a whole or brief plan reply, of the reply to a route or a climb, or of an error.
     columns : sequence of Column
         Columns of the table; ``index`` is skipped.
 
@@ -252,7 +282,7 @@ def row_of(payload: bytes, columns: Sequence[Column]) -> TableRow:
 
 
 def _readable(reply: dict[str, Any]) -> dict[str, Any]:
-    """Return a reply with its hands by limb, its hardest stage, and lists of words as texts."""
+    """Return a reply with hands by limb, hardest stage, counts, and lists of words as texts."""
     found = reply | {"hands": {}, "stages": None}
     found["warnings"] = "; ".join(reply.get("warnings") or ()) or None
     if reply.get("status") is not None:
@@ -266,6 +296,8 @@ def _readable(reply: dict[str, Any]) -> dict[str, Any]:
     crux, stages = reply.get("crux"), reply.get("stages")
     if crux is not None and stages:
         found |= {"stages": len(stages), "hardest": stages[crux]}
+    if reply.get("route") is not None:
+        found["moves"] = len(reply["route"]["moves"])
     for name in ("irreducible", "sufficient"):
         limits = (reply.get("certificate") or {}).get(name)
         found[name] = None if limits is None else "; ".join(map(_spoken, limits))

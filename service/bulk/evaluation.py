@@ -10,7 +10,7 @@ from hand_models.parameters import ParameterTable
 from planner import Lost
 from service.bulk.chunks import BULK_SETTINGS, Setting, about, grouping_order
 from service.bulk.pools import Here, Pool, pool_on
-from service.requests import PlanRequest, RouteRequest
+from service.requests import ClimbRequest, PlanRequest, RouteRequest
 from service.wire import (
     Answer,
     Format,
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Question", "answered", "evaluate"]
 
-Question = bytes | PlanRequest | RouteRequest | Answer
+Question = bytes | PlanRequest | RouteRequest | ClimbRequest | Answer
 
 
 def evaluate(
@@ -44,7 +44,7 @@ def evaluate(
     brief: bool = False,
     kind: str = ServiceName.PLAN,
 ) -> Generator[Answer, None, None]:
-    """Answer any number of plan requests or routes; yield answers and errors in request order.
+    """Answer any number of requests of one kind; yield answers and errors in request order.
 
     Requests are read as they are needed; only a bounded number of chunks is in work at a time. When
     a worker dies, it is replaced and its chunk is retried once. If the chunk is lost again, its
@@ -53,7 +53,7 @@ def evaluate(
 
     Parameters
     ----------
-    questions : iterable of bytes, PlanRequest, RouteRequest or Answer
+    questions : iterable of bytes, PlanRequest, RouteRequest, ClimbRequest or Answer
         Bytes are encoded requests. An `Answer` is returned in its place, unchanged.
     on : str or distributed.Client, optional
         Where the requests are answered: ``processes`` of this machine, ``here`` in this process,
@@ -77,13 +77,14 @@ def evaluate(
         True to return only the values of a table: of the extras that requests want only the load
         factor, and hands in brief unless they are explained.
     kind : str, optional
-        Type of all requests: ``plan`` or ``route``.
+        Type of all requests: ``plan``, ``route`` or ``climb``.
 
     Yields
     ------
     Answer
         Encoded reply or error reply of each request. All kinds of workers return the same bytes,
-        except for ``time`` and for results that a deadline has cut.
+        except for ``time``, ``seconds`` and results that a deadline, or the time of a search, has
+        cut.
 
     Raises
     ------
@@ -119,7 +120,7 @@ def answered(
 
     Parameters
     ----------
-    questions : iterable of bytes, PlanRequest, RouteRequest or Answer
+    questions : iterable of bytes, PlanRequest, RouteRequest, ClimbRequest or Answer
         Encoded or decoded requests; an `Answer` is returned in its place, unchanged.
     pool : Pool
         Pool of workers whose context has been entered.
@@ -267,7 +268,7 @@ def _encoded(question: Question, form: Format) -> bytes | Answer:
         name: Any = getattr(question, "id", None)
         known = name if isinstance(name, str) else None
         return encode_error(
-            MalformedError(f"not a PlanRequest, a RouteRequest or the bytes of one: {error}"),
+            MalformedError(f"not a request, or the bytes of one: {error}"),
             form,
             known,
         )

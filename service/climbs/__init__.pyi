@@ -4,6 +4,11 @@ from .files import (
     write_search as write_search,
     write_stance as write_stance,
 )
-from .listing import print_routes as print_routes
+from .listing import (
+    Listing as Listing,
+    climb_listing as climb_listing,
+    route_listing as route_listing,
+)
 from .seeking import seek as seek
-from .verdict import climb_status as climb_status, print_verdict as print_verdict
+from .sources import Sources as Sources
+from .verdict import print_verdict as print_verdict

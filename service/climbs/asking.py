@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -31,20 +32,30 @@ class Sought(NamedTuple):
     stand_off: tuple[float, ...]
     lean: float
 
-    def request(
-        self, rock: Path, read: Callable[[str], requests.PlanRequest]
-    ) -> requests.ClimbRequest:
-        """Return the request for a climb on a rock; ``read`` reads a stance of a name."""
+    def asking(
+        self, read: Callable[[str], requests.PlanRequest]
+    ) -> Callable[[Path], requests.ClimbRequest]:
+        """Return the function that returns the request for a climb on a rock.
+
+        Parameters
+        ----------
+        read : callable
+            Reads a stance of a name.
+
+        Raises
+        ------
+        InvalidInputError
+            If an option is impossible, whatever the rock.
+        """
         places: dict[str, Any] = {} if self.spacing is None else {"spacing": self.spacing}
         bodies: dict[str, Any] = {}
         if self.body_spacing is not None:
             bodies["spacing"] = self.body_spacing
         if self.stand_off:
             bodies["stand_offs"] = self.stand_off
-        return requests.ClimbRequest(
+        request = partial(
+            requests.ClimbRequest,
             v=1,
-            name=rock.stem,
-            rock=rock_message(rock, self.lean),
             surface=self.surface,
             places=PlaceGrid(**places),
             bodies=BodyGrid(**bodies),
@@ -54,6 +65,7 @@ class Sought(NamedTuple):
             start=climb_end(self.start, "--from", self.radius, read),
             goal=climb_end(self.goal, "--to", self.radius, read),
         )
+        return lambda rock: request(name=rock.stem, rock=rock_message(rock, self.lean))
 
 
 def demo_request() -> requests.ClimbRequest:

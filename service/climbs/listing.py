@@ -1,4 +1,4 @@
-"""Print the results of many routes, of which a file has a row each."""
+"""Print the results of many routes or climbs, of which a file has a row each."""
 
 from __future__ import annotations
 
@@ -6,63 +6,115 @@ import csv
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from service import bulk, tables
+from service import bulk, tables, wire
 
-__all__ = ["print_routes"]
+__all__ = ["Listing", "climb_listing", "route_listing"]
 
 
-def print_routes(file: Path, names: Sequence[str], before: int, elapsed: float) -> None:
-    """Print the result of each route, and the file of the results.
+class Listing(NamedTuple):
+    """Description of many questions of a kind, and the list of their results.
 
-    Parameters
+    Attributes
     ----------
-    file : Path
-        Of the results: ``.jsonl``, ``.csv`` or ``.parquet``.
-    names : sequence of str
-        Of all routes.
-    before : int
-        Number of routes that were answered before.
-    elapsed : float
-        Time for the others [s].
+    kind : str
+        Of `service.bulk.evaluate`.
+    noun : str
+        Plural name of what is listed.
+    work : str
+        What is done with them, in words.
+    plans : int
+        Plans of stances that take as long as one of them.
+    columns : tuple of Column
+        Of a table in a file.
+    printed : tuple of PrintedColumn
+        Of the table that is printed, without the last one, their names.
     """
-    from service.tables import name
 
-    out = tables.console()
+    kind: str
+    noun: str
+    work: str
+    plans: int
+    columns: tuple[bulk.Column, ...]
+    printed: tuple[tables.PrintedColumn, ...]
+
+    def print(self, file: Path, names: Sequence[str], before: int, elapsed: float) -> None:
+        """Print each result, and the file of the results.
+
+        Parameters
+        ----------
+        file : Path
+            Of the results: ``.jsonl``, ``.csv`` or ``.parquet``.
+        names : sequence of str
+            Of all that are listed.
+        before : int
+            Number of those that were answered before.
+        elapsed : float
+            Time for the others [s].
+        """
+        out = tables.console()
+        columns = (*self.printed, tables.text(self.noun.removesuffix("s"), "source"))
+        if tables.verbosity() >= 0:
+            most = 100
+            named = zip(names, islice(self._rows(file), most), strict=False)
+            tables.print_rows([row | {"source": name} for name, row in named], columns, out)
+            if len(names) > most:
+                out.print(f"and {len(names) - most} more", markup=False)
+        known = f", {before} were answered before" if before else ""
+        done = len(names) - before
+        noun = self.noun if done != 1 else self.noun.removesuffix("s")
+        out.print(f"{done} {noun} in {elapsed:.1f} s{known}", markup=False)
+        out.print(f"written: {file}", markup=False, soft_wrap=True)
+
+    def _rows(self, file: Path) -> Iterator[dict[str, Any]]:
+        """Yield each row of a file of any form."""
+        if file.suffix.lower() == ".parquet":
+            from pyarrow import parquet
+
+            yield from parquet.read_table(file).to_pylist()
+        elif file.suffix.lower() == ".csv":
+            with file.open(newline="", encoding="utf-8") as stream:
+                for row in csv.DictReader(stream):
+                    yield {name: value or None for name, value in row.items()}
+        else:
+            names = [column.name for column in self.columns if not column.is_index]
+            with file.open("rb") as lines:
+                for line in lines:
+                    yield dict(zip(names, bulk.row_of(line, self.columns).values, strict=True))
+
+
+def route_listing() -> Listing:
+    """Return how a number of routes is listed."""
     crux = ("crux_phase", "crux_limb")
-    columns = (
-        name("status", lambda row: row["status"] or f"error: {row['error_kind']}"),
-        name("crux", lambda row: " ".join(filter(None, map(row.get, crux))) or None),
+    printed = (
+        _status(),
+        tables.name("crux", lambda row: " ".join(filter(None, map(row.get, crux))) or None),
         tables.number("move", "crux_move"),
-        tables.number("util", "utilisation", lambda value: f"{float(value):.2f}"),
-        tables.number("load factor", "load_factor", lambda value: f"{float(value):.2f}"),
-        tables.text("route"),
+        tables.number("util", "utilisation", _decimal),
+        tables.number("load factor", "load_factor", _decimal),
     )
-    if tables.verbosity() >= 0:
-        most = 100
-        named = zip(names, islice(_rows(file), most), strict=False)
-        tables.print_rows([row | {"route": route} for route, row in named], columns, out)
-        if len(names) > most:
-            out.print(f"and {len(names) - most} more", markup=False)
-    known = f", {before} were answered before" if before else ""
-    out.print(f"{len(names) - before} routes in {elapsed:.1f} s{known}", markup=False)
-    out.print(f"written: {file}", markup=False, soft_wrap=True)
+    kind, columns = wire.ServiceName.ROUTE, bulk.route_columns()
+    return Listing(kind, "routes", "planning routes", 50, columns, printed)
 
 
-def _rows(file: Path) -> Iterator[dict[str, Any]]:
-    """Yield each route's row of a file of any form."""
-    if file.suffix.lower() == ".parquet":
-        from pyarrow import parquet
+def climb_listing() -> Listing:
+    """Return how climbs on a number of rocks are listed."""
+    printed = (
+        _status(),
+        tables.number("least", "least", _decimal),
+        tables.number("bound", "bound", _decimal),
+        tables.number("gap %", "gap", lambda value: f"{100.0 * float(value):.0f}"),
+        tables.number("moves"),
+        tables.number("knots"),
+    )
+    kind, columns = wire.ServiceName.CLIMB, bulk.climb_columns()
+    return Listing(kind, "rocks", "searching rocks", 1000, columns, printed)
 
-        yield from parquet.read_table(file).to_pylist()
-    elif file.suffix.lower() == ".csv":
-        with file.open(newline="", encoding="utf-8") as stream:
-            for row in csv.DictReader(stream):
-                yield {name: value or None for name, value in row.items()}
-    else:
-        columns = bulk.route_columns()
-        names = [column.name for column in columns if not column.is_index]
-        with file.open("rb") as lines:
-            for line in lines:
-                yield dict(zip(names, bulk.row_of(line, columns).values, strict=True))
+
+def _status() -> tables.PrintedColumn:
+    return tables.name("status", lambda row: row["status"] or f"error: {row['error_kind']}")
+
+
+def _decimal(value: float | str) -> str:
+    return f"{float(value):.2f}"

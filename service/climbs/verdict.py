@@ -1,4 +1,4 @@
-"""Say what came of the search for a climb: to a person, and as an exit status."""
+"""Say to a person what came of the search for a climb."""
 
 from __future__ import annotations
 
@@ -7,19 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planner import FoundClimb, constraint_words
-from service.tables import ExitStatus
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["climb_status", "print_verdict"]
-
-
-def climb_status(found: FoundClimb) -> ExitStatus:
-    """Return the exit status: 0 with a climb, 3 if there is none, 1 if none was found in time."""
-    if found.status in ("found", "not_proven"):
-        return ExitStatus.DONE
-    return ExitStatus.FAILED if found.status == "unknown" else ExitStatus.OVERLOADED
+__all__ = ["print_verdict"]
 
 
 def print_verdict(

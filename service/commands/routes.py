@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -13,8 +13,8 @@ import click
 import msgspec
 
 import planner
-from hand_models.base import CruxError, InvalidInputError, UnsupportedError, to_install
-from service import answering, bulk, climbs, requests, tables, wire
+from hand_models.base import InvalidInputError, UnsupportedError, to_install
+from service import answering, bulk, climbs, requests, tables
 from service.commands import options, stances
 from service.commands.batch import answer_rest, complain, exit_status, new_run
 
@@ -76,24 +76,19 @@ def route_command(
         return _stage(_Asked.of(routes, wanted, own), index, output, own, as_json)
     if output is None:
         raise InvalidInputError("missing: give -o DIR, or --stage K of one route", field="-o")
-    if output.suffix.lower() in {".jsonl", ".csv", ".parquet"}:
+    listing = climbs.route_listing()
+    if _is_listed(output, listing, len(routes) > 1 or _is_folder(routes[0]), resume):
         for option, asked_for in (("--spread", wanted.spread), ("--draws", wanted.draws)):
             if asked_for:
                 raise InvalidInputError(
                     f"is for one route, whose output -o is a folder, got {output}", field=option
                 )
-        return _many(_Routes(routes, own), output, resume, parallel, wanted, own, as_json)
-    if len(routes) > 1 or _is_folder(routes[0]):
-        raise InvalidInputError(
-            f"{output}: many routes need a file that ends in {LISTED_ENDINGS}", field="-o"
-        )
-    for option, given in (("--resume", resume), ("--dask", parallel.dask is not None)):
-        if given:
-            raise InvalidInputError(f"requires -o FILE that ends in {LISTED_ENDINGS}", field=option)
-    if output.exists() and not output.is_dir():
-        raise InvalidInputError(
-            f"{output}: must be a folder, or end in {LISTED_ENDINGS}", field="-o"
-        )
+        names = [name for source in routes for name in _files(source)]
+        sources = climbs.Sources(names, lambda name: own.asked(stances.read_route(name)))
+        unexplained = wanted.unexplained
+        return _many(listing, sources, output, resume, parallel, own, as_json, unexplained)
+    if parallel.dask is not None:
+        raise InvalidInputError(f"requires -o FILE that ends in {LISTED_ENDINGS}", field="--dask")
     return _one(_Asked.of(routes, wanted, own), output, parallel.workers, own, as_json)
 
 
@@ -136,30 +131,51 @@ sought_options = options.asked_for(
 
 
 @click.command("climb")
-@click.argument("rock", type=click.Path(path_type=Path))
+@click.argument("rocks", nargs=-1, required=True, metavar="ROCK...")
 @sought_options
-@options.folder_option("Where route, trajectory, stances, pictures, tables and the proof go.")
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Where route, trajectory, stances, pictures, tables and the proof of one rock go; or of "
+    f"any number of rocks a file that ends in {LISTED_ENDINGS}: the replies, one a line, or a "
+    "table.",
+)
+@click.option(
+    "--resume",
+    is_flag=True,
+    help="Go on where many rocks were broken off: what the file answers is not asked again.",
+)
 @options.workers_options
 @options.own_options
 @options.json_option
 def climb_command(
-    rock: Path,
+    rocks: tuple[str, ...],
     sought: climbs.Sought,
-    folder: Path,
+    output: Path,
+    resume: bool,
     parallel: options.WorkersOption,
     own: options.Own,
     as_json: bool,
 ) -> int:
-    """Search for the best climb on ROCK, with proof how much better any other can be.
+    """Search for the best climb on each ROCK, with proof how much better any other can be.
 
     ROCK is a mesh in metres with x up the rock and z into it, or a generated wall. height:Z is the
-    height of the body's origin in W: at most Z at the start, at least Z at the goal.
+    height of the body's origin in W: at most Z at the start, at least Z at the goal. Many rocks are
+    answered in order, with an error in the place of each rock that has one.
 
     Exit status: 0 with a climb, 3 if it is proven that there is none or no moves have a plan, 1 if
-    none was found in time.
+    none was found in time; of many rocks the worst that one of them has, as for crux batch.
     """
-    asked = own.asked(sought.request(rock, stances.read_request))
-    return search_climb(asked, folder, parallel, own, as_json)
+    listing = climbs.climb_listing()
+    listed = _is_listed(output, listing, len(rocks) > 1, resume)
+    asking = sought.asking(stances.read_request)
+    sources = climbs.Sources(rocks, lambda rock: own.asked(asking(Path(rock))))
+    if listed:
+        return _many(listing, sources, output, resume, parallel, own, as_json)
+    return search_climb(own.asked(asking(Path(rocks[0]))), output, parallel, own, as_json)
 
 
 def search_climb(
@@ -187,7 +203,7 @@ def search_climb(
         tables.say(reply | {"files": {name: str(path) for name, path in files.items()}})
     else:
         climbs.print_verdict(found.found, request.at_least, files, tables.console())
-    return climbs.climb_status(found.found)
+    return tables.ExitStatus.of(found.found.status)
 
 
 class _Asked(NamedTuple):
@@ -291,50 +307,6 @@ def _stage(asked: _Asked, index: int, file: Path | None, own: options.Own, as_js
     return tables.show(answer.reply, as_json)
 
 
-class _Routes:
-    """Files of routes; each is read when its turn comes, with its meshes put in.
-
-    Parameters
-    ----------
-    sources : sequence of str
-        As `read_route` takes them, and folders.
-    own : Own
-
-    Attributes
-    ----------
-    names : list of str
-        Name of each route.
-    count : int
-
-    Raises
-    ------
-    InvalidInputError
-        If a folder has none, or one is standard input, which is read once.
-    """
-
-    def __init__(self, sources: Sequence[str], own: options.Own) -> None:
-        self.names = [name for source in sources for name in _files(source)]
-        self.count = len(self.names)
-        self._own = own
-
-    def __iter__(self) -> Iterator[bytes]:
-        return (
-            each.payload if isinstance(each, wire.Answer) else each for each in self.questions()
-        )
-
-    def questions(self) -> Iterator[bytes | wire.Answer]:
-        """Yield routes, or the errors of their files."""
-        for name in self.names:
-            # an id has 256 characters at most
-            known = name[-256:]
-            try:
-                request = self._own.asked(stances.read_route(name))
-                request = msgspec.structs.replace(request, id=request.id or known)
-                yield wire.Format.JSON.encode(request)
-            except CruxError as error:
-                yield wire.encode_error(error, wire.Format.JSON, known)
-
-
 def _is_folder(source: str) -> bool:
     """Return whether a folder is meant, not a bundled route whose name a folder has, too."""
     return Path(source).is_dir() and source not in stances.bundled(requests.RouteRequest)
@@ -354,19 +326,39 @@ def _files(source: str) -> list[str]:
     return found
 
 
+def _is_listed(output: Path, listing: climbs.Listing, several: bool, resume: bool) -> bool:
+    """Return whether the output is a file of many results, not the folder of one."""
+    if output.suffix.lower() in {".jsonl", ".csv", ".parquet"}:
+        return True
+    if several:
+        raise InvalidInputError(
+            f"{output}: many {listing.noun} need a file that ends in {LISTED_ENDINGS}", field="-o"
+        )
+    if resume:
+        raise InvalidInputError(f"requires -o FILE that ends in {LISTED_ENDINGS}", field="--resume")
+    ends_so = output.suffix.lower() in (".json", *options.PICTURE_ENDINGS)
+    if not output.is_dir() and (output.exists() or ends_so):
+        raise InvalidInputError(
+            f"{output}: must be a folder, or end in {LISTED_ENDINGS}", field="-o"
+        )
+    return False
+
+
 def _many(
-    routes: _Routes,
+    listing: climbs.Listing,
+    sources: climbs.Sources,
     file: Path,
     resume: bool,
     parallel: options.WorkersOption,
-    wanted: options.Wanted,
     own: options.Own,
     as_json: bool,
+    unexplained: bool = True,
 ) -> int:
-    """Evaluate any number of routes, and keep their results."""
-    if any(os.path.abspath(name) == os.path.abspath(file) for name in routes.names):
+    """Answer any number of routes or climbs, and keep their results."""
+    if any(os.path.abspath(name) == os.path.abspath(file) for name in sources.names):
         raise InvalidInputError(
-            f"{file} is one of the routes and would be overwritten; name another file", field="-o"
+            f"{file} is one of the {listing.noun} and would be overwritten; name another file",
+            field="-o",
         )
     tables.write_alone(file)
     begun = perf_counter()
@@ -375,25 +367,25 @@ def _many(
             f"{file}: must be a file, not a device or pipe; name another", field="-o"
         )
     sink = new_run(
-        file, routes, bulk.route_columns, own, explained=not wanted.unexplained, resume=resume
+        file, sources, lambda: listing.columns, own, explained=not unexplained, resume=resume
     )
     before = sink.tally.count
-    # a route takes as long as 50 plans
-    on, workers = parallel.place(50 * (routes.count - before))
+    left = max(1, sources.count - before)
+    on, workers = parallel.place(listing.plans * left)
     answers = partial(
         bulk.evaluate,
         on=on,
-        workers=workers,
+        workers=None if workers is None else min(workers, left),
         robot=own.robot,
-        explain=False if wanted.unexplained else None,
-        kind=wire.ServiceName.ROUTE,
+        explain=False if unexplained else None,
+        kind=listing.kind,
     )
-    answer_rest(routes, answers, sink, file, "planning routes", "routes")
+    answer_rest(sources, answers, sink, file, listing.work, listing.noun)
     elapsed = perf_counter() - begun
-    complain(sink.tally, routes.names.__getitem__, "routes")
+    complain(sink.tally, sources.names.__getitem__, listing.noun)
     if as_json:
         counts = {"statuses": dict(sink.tally.statuses), "errors": dict(sink.tally.kinds)}
-        tables.say({"v": 1, "routes": routes.count, **counts, "file": str(file)})
+        tables.say({"v": 1, listing.noun: sources.count, **counts, "file": str(file)})
     else:
-        climbs.print_routes(file, routes.names, before, elapsed)
+        listing.print(file, sources.names, before, elapsed)
     return exit_status(sink.tally)

@@ -17,6 +17,7 @@ class ClimbReply(Reply, kw_only=True):
     """The best climb that a search has found, and how much better any other could be.
 
     - ``name``: name of the climb.
+    - ``robot``: name of the robot.
     - ``status``: ``found``: a climb, and no other is better by more than was allowed, or it has the
       load factor that was asked for; ``not_proven``: a climb, but another may be better by more;
       ``none``: it is proven that there is none, or none with the load factor that was asked for;
@@ -34,6 +35,7 @@ class ClimbReply(Reply, kw_only=True):
     - ``route``: the climb, as a request at ``crux/<robot>/route``, but without the rock: hands name
       it ``rock``, and it belongs into ``stance.rocks``; null without a climb.
     - ``stages``: all stances of the climb, as in the reply to a route.
+    - ``knots``: number of the climb's knots; null without a climb.
     - ``placements``, ``bodies``: number of placements of hands, and of poses of the body, of which
       climbs were made.
     - ``programs``: number of linear programs that were solved.
@@ -44,6 +46,7 @@ class ClimbReply(Reply, kw_only=True):
     """
 
     name: str
+    robot: str
     status: str
     least: float | None
     bound: float | None
@@ -54,6 +57,7 @@ class ClimbReply(Reply, kw_only=True):
     about: str
     route: RouteRequest | None
     stages: list[RouteStageReply]
+    knots: int | None
     placements: int
     bodies: int
     programs: int

@@ -28,6 +28,7 @@ from .holds import (
 )
 from .layout import (
     VERBOSITY_KEY as VERBOSITY_KEY,
+    PrintedColumn as PrintedColumn,
     console as console,
     in_order as in_order,
     name as name,

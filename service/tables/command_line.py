@@ -23,18 +23,19 @@ class ExitStatus(IntEnum):
 
     @classmethod
     def of(cls, status: str) -> ExitStatus:
-        """Return the exit status for the status of a plan or a route.
+        """Return the exit status for the status of a plan, a route or a climb.
 
         Parameters
         ----------
         status : str
-            ``optimal`` gives DONE; ``overloaded``, ``infeasible`` and ``unreachable`` give
+            ``optimal`` gives DONE, as does a climb (``found``, ``not_proven``); ``overloaded``,
+            ``infeasible``, ``unreachable``, and climbs that are not (``none``, ``blocked``) give
             OVERLOADED; any other status gives FAILED.
         """
         match status:
-            case "optimal":
+            case "optimal" | "found" | "not_proven":
                 return cls.DONE
-            case "overloaded" | "infeasible" | "unreachable":
+            case "overloaded" | "infeasible" | "unreachable" | "none" | "blocked":
                 return cls.OVERLOADED
             case _:
                 return cls.FAILED

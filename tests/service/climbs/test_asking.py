@@ -37,7 +37,7 @@ class AcceptedError(Exception):
 
 
 def sought(**changes):
-    return Sought(**TEXTS | changes).request(Path("small-wall:3"), read_request)
+    return Sought(**TEXTS | changes).asking(read_request)(Path("small-wall:3"))
 
 
 def test_a_request_has_what_the_options_say():
@@ -87,7 +87,7 @@ def test_a_mesh_stands_in_the_world_as_it_leans(tmp_path):
         "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
         "0 0 0\n0 1 0\n1 0 0\n3 0 1 2\n"
     )
-    request = Sought(**TEXTS | {"lean": 0.5}).request(file, read_request)
+    request = Sought(**TEXTS | {"lean": 0.5}).asking(read_request)(file)
     assert request.name == "flat"
     x, z = (np.array(axis) for axis in (request.rock.pose.x_axis, request.rock.pose.z_axis))
     # up and away from the climber, who looks along x of W

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import csv
 import json
+from pathlib import Path
 
+import numpy as np
 import pytest
 
+from hand_models.scans import generate_wall
 from planner import ClimbCertificate, check_bound
 from service.bulk import read_trajectory
 from service.commands.cli import run_command_line
+from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED
 
 ENDS = ("--from", "height:0.75", "--to", "height:1.1")
+TINY = ["--from", "height:0.8", "--to", "height:0.8", "--stand-off", "0.6"]
+TINY += ["--spacing", "0.3", "--body-spacing", "0.3"]
 SMALL = ("climb", "small-wall", "--spacing", "0.16", "--stand-off", "0.6", "--stand-off", "0.7")
 
 
@@ -70,3 +77,101 @@ def test_the_demonstration_climbs_and_its_route_is_planned_again(tmp_path, capsy
     assert run_command_line(["route", str(folder / "route.json"), "-o", str(again), "--json"]) == 0
     capsys.readouterr()
     assert len(read_trajectory(again)) == len(knots)
+
+
+def lines(file: Path) -> list[dict]:
+    """Replies in a file, without what depends on the clock."""
+    found = [json.loads(line) for line in file.read_bytes().splitlines()]
+    for each in found:
+        each.pop("seconds", None)
+    return found
+
+
+def rows(file: Path) -> list[dict]:
+    with file.open(newline="") as stream:
+        return [{key: each or None for key, each in row.items()} for row in csv.DictReader(stream)]
+
+
+def test_the_error_of_each_rock_is_in_its_place(tmp_path, capsys):
+    file = tmp_path / "climbs.jsonl"
+    given = ["climb", "no-wall", "small-wall:x", "small-wall", *TINY, "--lean", "0.1"]
+    assert run_command_line([*given, "-o", str(file), "--json"]) == BAD_INPUT
+    said = capsys.readouterr()
+    assert json.loads(said.out)["errors"] == {"invalid": 3}
+    assert said.err.startswith("crux: no-wall: ")
+    assert "2 more rocks are bad input: small-wall:x, small-wall" in said.err
+    fields = ["file", "rock", "--lean"]
+    assert [each["error"]["field"] for each in lines(file)] == fields
+    assert [each["id"] for each in lines(file)] == given[1:4]
+    table = tmp_path / "climbs.csv"
+    assert run_command_line([*given, "-o", str(table)]) == BAD_INPUT
+    assert [row["error_field"] for row in rows(table)] == fields
+    assert "error: invalid" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["a", "b", "-o", "out"], "many rocks need a file that ends in .jsonl or .csv"),
+        (["a", "-o", "out", "--resume"], "--resume: requires -o FILE"),
+        (["a", "-o", "out.png"], "must be a folder, or end in .jsonl"),
+        (["a", "b", "-o", "b.csv", "--best-within", "x"], "--best-within: must be a part"),
+        (["a.csv", "-o", "a.csv"], "a.csv is one of the rocks and would be overwritten"),
+    ],
+)
+def test_what_is_impossible_of_all_rocks_is_refused_at_once(
+    given, said, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    assert run_command_line(["climb", *TINY, *given]) == BAD_INPUT
+    assert said in capsys.readouterr().err
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_many_rocks_are_searched_in_processes_and_go_on_where_they_were_broken_off(
+    tmp_path, capsys
+):
+    """A robot of this weight holds nothing that is vertical: the second rock is the first, so."""
+    leaning, upright = "small-wall:2", tmp_path / "upright.off"
+    wall = generate_wall("small-wall", 2)
+    points = wall.vertices - np.array([wall.vertices[:, 0].min(), 0.0, 0.0])
+    head = f"OFF\n{len(points)} {len(wall.faces)} 0\n"
+    faces = np.column_stack([np.full(len(wall.faces), 3), wall.faces])
+    with upright.open("w") as out:
+        out.write(head)
+        np.savetxt(out, points, fmt="%.6f")
+        np.savetxt(out, faces, fmt="%d")
+    options = [*TINY, "--best-within", "10"]
+    rocks = [leaning, "no-wall", str(upright)]
+    whole, file = tmp_path / "whole.jsonl", tmp_path / "climbs.jsonl"
+    asked = ["climb", *rocks, *options, "-o"]
+    assert run_command_line([*asked, str(whole), "--workers", "2"]) == BAD_INPUT
+    shown = capsys.readouterr().out
+    assert shown.index("found") < shown.index("error: invalid") < shown.index("none")
+    found, wrong, none = lines(whole)
+    assert (found["status"], none["status"]) == ("found", "none")
+    assert wrong["error"]["field"] == "file"
+    assert found["robot"] == none["robot"] == "robosimian"
+    assert 1.0 <= found["least"] <= found["bound"]
+    assert none["least"] is None
+    # half of it, and a line that was cut off
+    half = ["climb", *rocks[:2], *options, "-o", str(file), "--workers", "1"]
+    assert run_command_line(half) == BAD_INPUT
+    with file.open("ab") as stream:
+        stream.write(b'{"v":1,')
+    assert run_command_line([*asked, str(file), "--resume", "--workers", "2"]) == BAD_INPUT
+    assert "1 rock in" in capsys.readouterr().out
+    assert lines(file) == lines(whole)
+    # the verdict of one alone, and the row of it
+    table = tmp_path / "climbs.csv"
+    assert run_command_line(["climb", leaning, *options, "-o", str(table)]) == DONE
+    (row,) = rows(table)
+    for name in ("status", "robot"):
+        assert row[name] == found[name]
+    for name in ("least", "bound", "gap", "placements", "bodies", "knots"):
+        assert float(row[name]) == found[name]
+    assert int(row["moves"]) == len(found["route"]["moves"])
+    assert int(row["deciding_stage"]) == found["deciding"]["stage"]
+    assert row["limiting_limb"] == found["deciding"]["limiting"]["limb"]
+    assert run_command_line(["climb", str(upright), *options, "-o", str(table)]) == OVERLOADED

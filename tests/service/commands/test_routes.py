@@ -111,7 +111,7 @@ def test_routes_go_on_where_they_were_broken_off(ending, climbs, tmp_path, capfd
     with file.open("ab") as stream:
         stream.write(whole.read_bytes()[file.stat().st_size :][:5])
     assert run_command_line(["route", *asked, "-o", str(file), "--resume"]) == BAD_INPUT
-    assert "1 routes in" in capfd.readouterr().out.replace("2 were answered", "")
+    assert "1 route in" in capfd.readouterr().out.replace("2 were answered", "")
     assert file.read_bytes() == whole.read_bytes()
     # other routes are no work to go on with
     assert (
