@@ -10,6 +10,7 @@ from .finger_twist import FINGER_TWIST as FINGER_TWIST, twist_arms as twist_arms
 from .hold_trials import (
     AT_BORDER as AT_BORDER,
     HOLD_RANKS as HOLD_RANKS,
+    REFUSAL_WORDS as REFUSAL_WORDS,
     FoundHold as FoundHold,
     HoldRank as HoldRank,
     HoldTrial as HoldTrial,

@@ -38,6 +38,7 @@ from hand_models.tile import Surface
 __all__ = [
     "AT_BORDER",
     "HOLD_RANKS",
+    "REFUSAL_WORDS",
     "FoundHold",
     "HoldRank",
     "HoldTrial",
@@ -49,6 +50,20 @@ __all__ = [
 
 AT_BORDER: Final = "the scan ends, or has a hole, within a finger's reach"
 """Message for a place where a finger may reach the scan's border, so that no hand is tried."""
+
+REFUSAL_WORDS: Final = {
+    "scan_border": AT_BORDER,
+    "palm_in_rock": "rock is inside the palm",
+    "finger_in_rock": "rock is inside a finger even with its joints fully open",
+    "tendon_slack": "the closing tension does not close the fingers",
+    "no_equilibrium": "no equilibrium of a finger was found",
+    "no_rest": "the closed hand comes to rest nowhere near its seat",
+    "unstable_rest": "the closed hand does not stay where its net force is zero",
+    "other": "other reasons",
+    "holds_nothing": "a hand can be there, but holds nothing in any direction",
+    "unbounded": "no limit of its own bounds what a finger or the palm carries",
+}
+"""Reasons why there is no hold at a place, in words by kind (`RefusedPlaceError.reason`)."""
 
 HoldRank = Literal["robust", "share", "pure", "support"]
 

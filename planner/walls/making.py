@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError, Pose, UnsupportedError, errors_under, go_on
-from hand_models.fixed_wrist import HoldTrial, input_digests, wrench_space
+from hand_models.fixed_wrist import REFUSAL_WORDS, HoldTrial, input_digests, wrench_space
 from hand_models.rock import Mesh
 from hand_models.tile import Surface
 from planner import deadline
@@ -224,10 +224,14 @@ def wall_of(
     hands = [hand_at(place, *rock, limb) for place in found] + hands
     parts = [place.parts for place in found] + parts
     if not hands:
+        tried = sum(map(len, points))
+        counts = {REFUSAL_WORDS[kind]: count for kind, count in refused.most_common()}
+        if lost_trials:
+            counts["not tried, as processes died of them"] = lost_trials
+        reasons = "; ".join(f"{count} of {tried} hands: {words}" for words, count in counts.items())
         raise InvalidInputError(
-            f"no hand holds anything on this rock: {dict(refused)}; try a smaller spacing, or more "
-            "angles",
-            field="places",
+            f"no hand holds anything on this rock ({reasons}); try a smaller spacing",
+            field="places.spacing",
         )
     placed = time.perf_counter()
     rows = _rows([hand.pose for hand in hands])

@@ -337,13 +337,15 @@ def _marks(
 
     A point without a hold has the kind of reason of most of its trials.
     """
+    from hand_models.fixed_wrist import REFUSAL_WORDS
+
     kinds: dict[Point, Counter[str]] = {}
     for i, outcome in sorted(outcomes.items()):
         if trials[i].point not in values:
             kinds.setdefault(trials[i].point, Counter())[tables.refusal_kind(outcome)] += 1
     marked: dict[str, list[Point]] = {}
     for point, counts in kinds.items():
-        words = tables.REFUSAL_WORDS[counts.most_common(1)[0][0]]
+        words = REFUSAL_WORDS[counts.most_common(1)[0][0]]
         marked.setdefault(words, []).append(point)
     unknown = [point for point, value in values.items() if math.isnan(value)]
     if unknown:

@@ -20,7 +20,6 @@ from .hands import (
     survey_json as survey_json,
 )
 from .holds import (
-    REFUSAL_WORDS as REFUSAL_WORDS,
     hold_json as hold_json,
     print_holds as print_holds,
     refusal_kind as refusal_kind,

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from hand_models.base import Array, InvalidInputError, RefusedPlaceError
 from hand_models.fixed_wrist import (
     FORCE_TOLERANCE,
+    REFUSAL_WORDS,
     TRIAL_WAYS,
     FoundHold,
     HoldRank,
@@ -22,20 +23,7 @@ from service.tables.layout import name, number, print_rows, print_warnings, text
 if TYPE_CHECKING:
     from hand_models.hand import Placing
 
-__all__ = ["REFUSAL_WORDS", "hold_json", "print_holds", "refusal_kind", "refusals_json"]
-
-REFUSAL_WORDS: Final = {
-    "scan_border": "the scan ends, or has a hole, within a finger's reach",
-    "palm_in_rock": "rock is inside the palm",
-    "finger_in_rock": "rock is inside a finger even with its joints fully open",
-    "tendon_slack": "the closing tension does not close the fingers",
-    "no_equilibrium": "no equilibrium of a finger was found",
-    "no_rest": "the closed hand comes to rest nowhere near its seat",
-    "unstable_rest": "the closed hand does not stay where its net force is zero",
-    "other": "other reasons: see reasons in the file",
-    "holds_nothing": "a hand can be there, but holds nothing in any direction",
-}
-"""Kinds of reasons why there is no hold at a place, in words (`RefusedPlaceError.reason`)."""
+__all__ = ["hold_json", "print_holds", "refusal_kind", "refusals_json"]
 
 Pair = tuple[HoldTrial, FoundHold]
 
@@ -122,7 +110,7 @@ def refusals_json(
 
 
 def refusal_kind(found: FoundHold | InvalidInputError) -> str:
-    """Return the key of `REFUSAL_WORDS` that says why there is no hold at a place."""
+    """Return the kind of reason why there is no hold at a place, of `REFUSAL_WORDS`."""
     if not isinstance(found, InvalidInputError):
         return "holds_nothing"
     return found.reason if isinstance(found, RefusedPlaceError) else "other"
@@ -207,7 +195,8 @@ def print_holds(
     idle = result["tried"] - result["refused"] - len(found)
     without = result["kinds"] | ({"holds_nothing": idle} if idle else {})
     if without:
-        rows = [(kind, f"{count:,}", REFUSAL_WORDS[kind]) for kind, count in without.items()]
+        words = REFUSAL_WORDS | {"other": "other reasons: see reasons in the file"}
+        rows = [(kind, f"{count:,}", words[kind]) for kind, count in without.items()]
         columns = [name("kind", "0"), number("places", "1"), text("why", "2")]
         print_rows(rows, columns, out, "places without a hold")
 

@@ -1,5 +1,6 @@
 """Walls that are made: the tables are those of their placements and bodies, and move with them."""
 
+import re
 from dataclasses import replace
 
 import msgspec
@@ -23,7 +24,14 @@ from planner.prepare import settle_each
 from planner.programs import WRENCH_UNIT
 from planner.reach import reach_table
 from planner.walls import BodyGrid, PlaceGrid, read_wall, wall_digest, wall_of, write_wall
-from tests.suite.helpers.climbing_walls import arrays_of, tiny_source, tiny_wall
+from tests.suite.helpers.climbing_walls import (
+    FLAT,
+    TINY,
+    arrays_of,
+    rock_of,
+    tiny_source,
+    tiny_wall,
+)
 
 DIRECTIONS = np.random.default_rng(0).normal(size=(10, 6))
 
@@ -199,6 +207,17 @@ def test_a_deadline_ends_it():
     assert len(asked) <= 1
 
 
+def test_hands_that_hold_nothing_are_counted_in_words():
+    rock, pose = rock_of(lean=0.0, **TINY, **FLAT)
+    source = tiny_source(rock=rock, rock_pose=pose)
+    with pytest.raises(InvalidInputError) as caught:
+        wall_of(source, source.poses())
+    found = re.findall(r"(\d+) of (\d+) hands: ", str(caught.value))
+    (total,) = {int(each) for _, each in found}
+    assert sum(int(count) for count, _ in found) == total
+    assert "hands: a hand can be there, but holds nothing in any direction" in str(caught.value)
+
+
 def test_questions_are_plain_bytes():
     source = tiny_source()
     questions = []
@@ -207,10 +226,14 @@ def test_questions_are_plain_bytes():
         questions.extend(every)
         return [None] * len(every)
 
-    with pytest.raises(InvalidInputError, match="no hand holds anything on this rock"):
+    with pytest.raises(InvalidInputError) as caught:
         wall_of(source, source.poses(), ask)
     points = [point for each in questions for point in msgspec.msgpack.decode(each)["points"]]
     assert len(points) == 20
+    assert str(caught.value) == (
+        "places.spacing: no hand holds anything on this rock (40 of 40 hands: not tried, as "
+        "processes died of them); try a smaller spacing"
+    )
     assert all(len(trial) == 4 for point in points for trial in point)
 
 
