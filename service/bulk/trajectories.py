@@ -79,7 +79,7 @@ def read_trajectory(folder: Path) -> list[KnotReply]:
         text = path.read_bytes()
     except OSError as error:
         raise InvalidInputError(
-            f"{path}: {error.strerror}; write it with: crux route ROUTE -o {folder}", field="DIR"
+            f"{path}: {error.strerror}; write it with: {_command(folder)}", field="DIR"
         ) from None
     knots: list[KnotReply] = []
     for number, line in enumerate(text.splitlines(), start=1):
@@ -90,8 +90,7 @@ def read_trajectory(folder: Path) -> list[KnotReply]:
         wrong = _wrong_alone(knots[-1]) or (_wrong_after(*knots[-2:]) if len(knots) > 1 else None)
         if wrong is not None:
             raise InvalidInputError(
-                f"{path}, line {number}: {wrong}; write it again with: "
-                f"crux route ROUTE -o {folder}",
+                f"{path}, line {number}: {wrong}; write it again with: {_command(folder)}",
                 field="DIR",
             )
     if not knots:
@@ -147,7 +146,7 @@ def trajectory_digest(folder: Path, rates: Mapping[str, float]) -> str:
 
 
 def read_climb(folder: Path) -> tuple[list[KnotReply], ClimbSummary]:
-    """Read a climb that is to be played: knots and summary, as ``crux route`` has written both.
+    """Read a climb that is to be played: knots and summary, as one command has written both.
 
     Raises
     ------
@@ -156,7 +155,7 @@ def read_climb(folder: Path) -> tuple[list[KnotReply], ClimbSummary]:
         edited: its knots have been verified as they were written.
     """
     knots, about = read_trajectory(folder), read_climb_summary(folder)
-    again, count = f"write both again with: crux route ROUTE -o {folder}", knots[-1].index + 1
+    again, count = f"write both again with: {_command(folder)}", knots[-1].index + 1
     if count != about.climb.knots:
         raise InvalidInputError(
             f"{folder}: the trajectory ends after {count} knots, the climb of summary.json has "
@@ -216,9 +215,15 @@ def read_climb_summary(folder: Path) -> ClimbSummary:
         message = str(error.strerror)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         message = str(error)
-    raise InvalidInputError(
-        f"{path}: {message}; write it with: crux route ROUTE -o {folder}", field="DIR"
-    )
+    raise InvalidInputError(f"{path}: {message}; write it with: {_command(folder)}", field="DIR")
+
+
+def _command(folder: Path) -> str:
+    """Return the command that writes a climb into a folder: the one that has written there."""
+    route, climb = f"crux route ROUTE -o {folder}", f"crux climb ROCK --from … --to … -o {folder}"
+    if (folder / "wall.npz").exists():
+        return climb
+    return route if (folder / "stages.csv").exists() else f"{route}, or {climb}"
 
 
 def _lines_of(folder: Path) -> Path:

@@ -86,8 +86,15 @@ def test_without_pyarrow_there_are_the_lines_alone(knots, tmp_path, monkeypatch)
 
 
 def test_a_bad_trajectory_names_its_file_and_its_line(knots, tmp_path):
-    with pytest.raises(InvalidInputError, match="crux route ROUTE -o"):
-        read_trajectory(tmp_path)
+    for writer, command in (
+        ("", "write it with: crux route ROUTE -o .*, or crux climb ROCK .* -o "),
+        ("stages.csv", "write it with: crux route ROUTE -o [^,]*$"),
+        ("wall.npz", "write it with: crux climb ROCK --from … --to … -o "),
+    ):
+        if writer:
+            (tmp_path / writer).touch()
+        with pytest.raises(InvalidInputError, match=command):
+            read_trajectory(tmp_path)
     file = tmp_path / "trajectory.jsonl"
     lines = msgspec.json.Encoder().encode_lines(knots).splitlines(keepends=True)
     file.write_bytes(lines[0] + b'{"index": 1}\n')
