@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planner import FoundClimb, constraint_words
+from service.tables import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -48,8 +49,8 @@ def _sentences(found: FoundClimb, at_least: float | None) -> Iterator[str]:
             f"(gap {100.0 * found.gap:.1f} %); {found.found.least:.3f} by statics alone"
         )
         knots = found.climb.knots
-        moves = len(found.climb.route.moves)
-        yield f"{moves} moves, {len(knots)} knots, {knots[-1].time:.0f} s long"
+        moves = counted(len(found.climb.route.moves), "move of a limb", "moves of limbs")
+        yield f"{moves}, {counted(len(knots), 'knot')}, {knots[-1].time:.0f} s long"
     elif abs(found.bound) < float("inf"):
         yield f"no climb has a least load factor above {found.bound:.3f}"
     deciding = found.deciding
@@ -61,11 +62,11 @@ def _sentences(found: FoundClimb, at_least: float | None) -> Iterator[str]:
             if deciding.limiting is None
             else (f"; {deciding.limiting.limb}: {constraint_words(deciding.limiting)} is used most")
         )
-        yield f"stage {deciding.stage} decides (move {deciding.move}, {what}; {where}){limit}"
+        move = f"move {deciding.move}, " if deciding.move else ""
+        yield f"stage {deciding.stage} decides ({move}{what}; {where}){limit}"
     for each in found.raises[:3]:
         yield f"  there {each.load_factor:.3f} with {each.change}"
     for kind in found.refused[:3]:
-        times = f"{kind.count} moves" if kind.count > 1 else "a move"
         which = kind.phase if kind.limb is None else f"{kind.phase} of {kind.limb}"
-        yield f"{times} had no plan ({which}): {kind.reason}"
+        yield f"{counted(kind.count, 'move')} had no plan ({which}): {kind.reason}"
     yield found.about

@@ -29,6 +29,7 @@ from .layout import (
     VERBOSITY_KEY as VERBOSITY_KEY,
     PrintedColumn as PrintedColumn,
     console as console,
+    counted as counted,
     in_order as in_order,
     name as name,
     number as number,

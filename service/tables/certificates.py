@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from planner import BoundCheck, ClimbCertificate, RouteCheck
-from service.tables.layout import in_colour, in_order, print_rows, verbosity
+from service.tables.layout import counted, in_colour, in_order, print_rows, verbosity
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -32,7 +32,8 @@ def print_certificate(
     begin, end = ("goal", "start") if claimed.backward else ("start", "goal")
     stated = ""
     if len(route.factors):
-        stated = f"{len(route.factors)} states, least load factor {claimed.route_factors.min():.6g}"
+        states = counted(len(route.factors), "state")
+        stated = f"{states}, least load factor {claimed.route_factors.min():.6g}"
     ways = len(claimed.directions) + len(claimed.own_directions)
     claim = f"no climb has a least load factor of {claimed.multiple:.6g} or more"
     if not claimed.multiple:
@@ -46,14 +47,15 @@ def print_certificate(
         ("bound", claim),
         (
             "rests on",
-            f"{places} placements, {bodies} bodies, {limbs} limbs, {claimed.reached.sum():,} of "
-            f"{claimed.reached.size:,} within reach, {len(claimed.shifts)} shifts of the body; "
-            f"sets of the hands (fixed wrists), body wrenches and limbs' moments as in the file",
+            f"{counted(places, 'placement')}, {counted(bodies, 'body', 'bodies')}, "
+            f"{counted(limbs, 'limb')}, {claimed.reached.sum():,} of {claimed.reached.size:,} "
+            f"within reach, {counted(len(claimed.shifts), 'shift')} of the body; sets "
+            "of the hands (fixed wrists), body wrenches and limbs' moments as in the file",
         ),
         (
             "recomputed",
-            f"supports in {ways} directions; {bound.connected:,} states connected with the {begin}"
-            f", {bound.ruled_out:,} next to them ruled out",
+            f"supports in {counted(ways, 'direction')}; {counted(bound.connected, 'state')} "
+            f"connected with the {begin}, {bound.ruled_out:,} next to them ruled out",
         ),
         ("", in_colour("optimal", "proven") if bound.proven else in_colour("failed", "not proven")),
     ]

@@ -21,7 +21,7 @@ from planner import (
     SurvivalShare,
 )
 from service.replies import PlanReply
-from service.tables.layout import in_order, print_rows
+from service.tables.layout import counted, in_order, print_rows
 
 __all__ = [
     "print_advice",
@@ -119,12 +119,13 @@ def print_spread(spread: Spread, out: Console) -> None:
     ]
     if len(rows) > 1:
         heads = ("feasible", "overloaded", "no balance", "utilisation")
-        print_rows(rows, in_order([_samples(spread.draws)], heads), out, result=True)
+        print_rows(rows, in_order([counted(spread.draws, "sample")], heads), out, result=True)
 
 
 def _spread_sentence(spread: Spread) -> str:
     """Return in a sentence on which rock a stance is feasible, else in how many samples."""
-    limit, said = spread.threshold, f"feasible in {spread.holds} of {_samples(spread.draws)}"
+    limit, samples = spread.threshold, counted(spread.draws, "sample")
+    said = f"feasible in {spread.holds} of {samples}"
     within = f" within a utilisation of {spread.cap:g}" if spread.cap < 1.0 else ""
     if limit is not None:
         least, most = (f"{ratio:g}" for ratio in limit.range)
@@ -141,7 +142,7 @@ def _spread_sentence(spread: Spread) -> str:
     else:
         said += within
     if spread.without:
-        said += f"; {_samples(spread.without)} without a plan"
+        said += f"; {counted(spread.without, 'sample')} without a plan"
     lost = spread.load_factors.count(None)
     if lost > spread.without:
         said += f"; {lost} without a load factor"
@@ -354,7 +355,3 @@ def _interval(spread: Quantiles, digits: int | None = None) -> str:
     digits = _digits(spread) if digits is None else digits
     low, high = f"{spread.low:.{digits}f}", f"{spread.high:.{digits}f}"
     return low if low == high else f"{low} to {high}"
-
-
-def _samples(count: int) -> str:
-    return f"{count} sample" + ("" if count == 1 else "s")

@@ -17,6 +17,7 @@ __all__ = [
     "PrintedColumn",
     "axis_unit",
     "console",
+    "counted",
     "in_colour",
     "in_order",
     "name",
@@ -80,6 +81,21 @@ def print_warnings(warnings: Iterable[str], out: Console) -> None:
 
     for warning in warnings:
         out.print(Text.assemble(("warning:", "bold"), f" {warning}"))
+
+
+def counted(count: int, one: str, many: str | None = None) -> str:
+    """Return a number of things in words, such as ``no moves``, ``1 move`` or ``1,200 moves``.
+
+    Parameters
+    ----------
+    count : int
+    one : str
+        The thing.
+    many : str, optional
+        Several of it; by default with an s.
+    """
+    things = one if count == 1 else many or f"{one}s"
+    return f"{count:,} {things}" if count else f"no {things}"
 
 
 def short(value: float, digits: int) -> str:

@@ -10,7 +10,7 @@ import pytest
 
 from hand_models.base import InvalidInputError
 from planner import BodyGrid, PlaceGrid
-from planner.climbs import RefusedMoves
+from planner.climbs import DecidingStage, RefusedMoves
 from service.answering import seek_climb
 from service.climbs import Sought, climb_end, print_verdict
 from service.commands.stances import read_request
@@ -122,8 +122,8 @@ def test_an_end_that_a_refusal_names_is_accepted():
 
 def test_a_move_of_no_limb_is_told_without_one(capsys):
     refused = [
-        RefusedMoves(limb=limb, phase=phase, reason="too far", count=1)
-        for limb, phase in ((None, "shift"), ("rear_left", "swing"))
+        RefusedMoves(limb=limb, phase=phase, reason="too far", count=count)
+        for limb, phase, count in ((None, "shift", 1), ("rear_left", "swing", 2))
     ]
     found = SimpleNamespace(
         status="unknown",
@@ -137,5 +137,45 @@ def test_a_move_of_no_limb_is_told_without_one(capsys):
     )
     print_verdict(found, None, {}, console())
     printed = capsys.readouterr().out
-    assert "a move had no plan (shift): too far" in printed
-    assert "a move had no plan (swing of rear_left): too far" in printed
+    assert "1 move had no plan (shift): too far" in printed
+    assert "2 moves had no plan (swing of rear_left): too far" in printed
+
+
+@pytest.mark.parametrize(
+    ("moves", "knots", "move", "said"),
+    [
+        (0, 1, 0, ("no moves of limbs, 1 knot, 0 s long", "stage 0 decides (start; rear at 3)")),
+        (1, 2, 1, ("1 move of a limb, 2 knots, 4 s long", "decides (move 1, start; rear at 3)")),
+        (2, 3, 2, ("2 moves of limbs, 3 knots, 8 s long", "decides (move 2, start; rear at 3)")),
+    ],
+)
+def test_none_and_one_read_well(moves, knots, move, said, capsys):
+    deciding = DecidingStage(
+        stage=0,
+        move=move,
+        phase="start",
+        limb=None,
+        load_factor=1.2,
+        limiting=None,
+        placements={"rear": 3},
+        body=0,
+    )
+    found = SimpleNamespace(
+        status="found",
+        least=1.2,
+        gap=0.0,
+        bound=1.2,
+        found=SimpleNamespace(least=1.2),
+        climb=SimpleNamespace(
+            route=SimpleNamespace(moves=[None] * moves),
+            knots=[SimpleNamespace(time=4.0 * i) for i in range(knots)],
+        ),
+        deciding=deciding,
+        raises=(),
+        about="",
+        refused=(),
+    )
+    print_verdict(found, None, {}, console())
+    printed = capsys.readouterr().out
+    for words in said:
+        assert words in printed
