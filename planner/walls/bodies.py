@@ -117,7 +117,8 @@ def _measured(rock: Mesh, spacing: float) -> Array:
     found: Array = starts[np.isfinite(depths)]
     if len(found) < 3:
         raise InvalidInputError(
-            "hardly any rock faces −z of its frame; is the mesh flipped, or smaller than that?",
+            "hardly any rock faces −z of its frame; is the mesh flipped, or smaller than "
+            f"{spacing:g} m?",
             field="sample",
         )
     return found

@@ -9,6 +9,7 @@ from .listing import (
     climb_listing as climb_listing,
     route_listing as route_listing,
 )
+from .naming import naming_options as naming_options, with_options as with_options
 from .seeking import seek as seek
 from .sources import Sources as Sources
 from .verdict import print_verdict as print_verdict

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, errors_under
 from planner import BodyGrid, PlaceGrid
 from service import requests
 from service.climbs.rocks import rock_message
@@ -45,7 +45,7 @@ class Sought(NamedTuple):
         Raises
         ------
         InvalidInputError
-            If an option is impossible, whatever the rock.
+            If an option is impossible, whatever the rock; of a grid, with its field.
         """
         places: dict[str, Any] = {} if self.spacing is None else {"spacing": self.spacing}
         bodies: dict[str, Any] = {}
@@ -53,12 +53,16 @@ class Sought(NamedTuple):
             bodies["spacing"] = self.body_spacing
         if self.stand_off:
             bodies["stand_offs"] = self.stand_off
+        with errors_under("places"):
+            place_grid = PlaceGrid(**places)
+        with errors_under("bodies"):
+            body_grid = BodyGrid(**bodies)
         request = partial(
             requests.ClimbRequest,
             v=1,
             surface=self.surface,
-            places=PlaceGrid(**places),
-            bodies=BodyGrid(**bodies),
+            places=place_grid,
+            bodies=body_grid,
             best_within=_part(self.best_within, "--best-within"),
             at_least=self.at_least,
             time=self.time,

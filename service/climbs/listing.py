@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from service import bulk, tables, wire
+from service.climbs.naming import with_options
 
 __all__ = ["Listing", "climb_listing", "route_listing"]
+
+
+Answers = Generator[wire.Answer, None, None]
 
 
 class Listing(NamedTuple):
@@ -30,6 +34,8 @@ class Listing(NamedTuple):
         Of a table in a file.
     printed : tuple of PrintedColumn
         Of the table that is printed, without the last one, their names.
+    answers : callable
+        Takes the answers, and returns them as they are kept.
     """
 
     kind: str
@@ -38,6 +44,7 @@ class Listing(NamedTuple):
     plans: int
     columns: tuple[bulk.Column, ...]
     printed: tuple[tables.PrintedColumn, ...]
+    answers: Callable[[Answers], Answers]
 
     def print(self, file: Path, names: Sequence[str], before: int, elapsed: float) -> None:
         """Print each result, and the file of the results.
@@ -54,7 +61,8 @@ class Listing(NamedTuple):
             Time for the others [s].
         """
         out = tables.console()
-        columns = (*self.printed, tables.text(self.noun.removesuffix("s"), "source"))
+        one = self.noun.removesuffix("s")
+        columns = (*self.printed, tables.text(one, "source"))
         if tables.verbosity() >= 0:
             most = 100
             named = zip(names, islice(self._rows(file), most), strict=False)
@@ -62,9 +70,8 @@ class Listing(NamedTuple):
             if len(names) > most:
                 out.print(f"and {len(names) - most} more", markup=False)
         known = f", {before} were answered before" if before else ""
-        done = len(names) - before
-        noun = self.noun if done != 1 else self.noun.removesuffix("s")
-        out.print(f"{done} {noun} in {elapsed:.1f} s{known}", markup=False)
+        done = tables.counted(len(names) - before, one, self.noun)
+        out.print(f"{done} in {elapsed:.1f} s{known}", markup=False)
         out.print(f"written: {file}", markup=False, soft_wrap=True)
 
     def _rows(self, file: Path) -> Iterator[dict[str, Any]]:
@@ -95,7 +102,7 @@ def route_listing() -> Listing:
         tables.number("load factor", "load_factor", _decimal),
     )
     kind, columns = wire.ServiceName.ROUTE, bulk.route_columns()
-    return Listing(kind, "routes", "planning routes", 50, columns, printed)
+    return Listing(kind, "routes", "planning routes", 50, columns, printed, lambda answers: answers)
 
 
 def climb_listing() -> Listing:
@@ -109,7 +116,7 @@ def climb_listing() -> Listing:
         tables.number("knots"),
     )
     kind, columns = wire.ServiceName.CLIMB, bulk.climb_columns()
-    return Listing(kind, "rocks", "searching rocks", 1000, columns, printed)
+    return Listing(kind, "rocks", "searching rocks", 1000, columns, printed, with_options)
 
 
 def _status() -> tables.PrintedColumn:

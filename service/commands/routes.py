@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -14,7 +14,7 @@ import msgspec
 
 import planner
 from hand_models.base import InvalidInputError, UnsupportedError, to_install
-from service import answering, bulk, climbs, requests, tables
+from service import answering, bulk, climbs, requests, tables, wire
 from service.commands import options, stances
 from service.commands.batch import answer_rest, complain, exit_status, new_run
 
@@ -171,11 +171,13 @@ def climb_command(
     """
     listing = climbs.climb_listing()
     listed = _is_listed(output, listing, len(rocks) > 1, resume)
-    asking = sought.asking(stances.read_request)
+    with climbs.naming_options():
+        asking = sought.asking(stances.read_request)
     sources = climbs.Sources(rocks, lambda rock: own.asked(asking(Path(rock))))
     if listed:
         return _many(listing, sources, output, resume, parallel, own, as_json)
-    return search_climb(own.asked(asking(Path(rocks[0]))), output, parallel, own, as_json)
+    with climbs.naming_options():
+        return search_climb(own.asked(asking(Path(rocks[0]))), output, parallel, own, as_json)
 
 
 def search_climb(
@@ -372,7 +374,7 @@ def _many(
     before = sink.tally.count
     left = max(1, sources.count - before)
     on, workers = parallel.place(listing.plans * left)
-    answers = partial(
+    answer = partial(
         bulk.evaluate,
         on=on,
         workers=None if workers is None else min(workers, left),
@@ -380,6 +382,10 @@ def _many(
         explain=False if unexplained else None,
         kind=listing.kind,
     )
+
+    def answers(asked: Iterator[bulk.Question]) -> Generator[wire.Answer, None, None]:
+        return listing.answers(answer(asked))
+
     answer_rest(sources, answers, sink, file, listing.work, listing.noun)
     elapsed = perf_counter() - begun
     complain(sink.tally, sources.names.__getitem__, listing.noun)

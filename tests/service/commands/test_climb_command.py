@@ -27,19 +27,36 @@ SMALL = ("climb", "small-wall", "--spacing", "0.16", "--stand-off", "0.6", "--st
         (("climb", "no-wall", *ENDS), "generated walls are leaning-wall"),
         (("climb", "small-wall:x", *ENDS), "seed of a wall must be a whole number, got 'x'"),
         ((*SMALL, *ENDS, "--lean", "0.3"), "--lean"),
-        ((*SMALL, "--from", "9,9,9", "--to", "height:1"), "start.near"),
-        ((*SMALL, "--from", "height:0.75", "--to", "height:9"), "goal.height"),
+        ((*SMALL, "--from", "9,9,9", "--to", "height:1"), "--from: no pose"),
+        ((*SMALL, "--from", "height:0.75", "--to", "height:9"), "--to: no pose"),
         ((*SMALL, "--from", "nan,0,0", "--to", "height:1"), "--from"),
         ((*SMALL, *ENDS, "--surface", "glass"), "surface"),
         ((*SMALL, *ENDS, "--time", "0"), "--time"),
         ((*SMALL, *ENDS, "--at-least", "nan"), "--at-least"),
         ((*SMALL, *ENDS, "--best-within", "x"), "--best-within"),
         ((*SMALL, "--to", "height:1"), "--from"),
+        ((*SMALL, "--from", "9,9,9", "--to", "height:1"), "or a finer grid (--body-spacing)"),
+        ((*SMALL, *ENDS, "--spacing", "0.001"), "--spacing: must be 0.005 to 10 m, got 0.001"),
+        ((*SMALL, *ENDS, "--body-spacing", "0.001"), "--body-spacing: must be 0.005 to 10 m"),
+        ((*SMALL, *ENDS, "--stand-off", "0.7"), "--stand-off: must be at least one number, and no"),
+        (("climb", "small-wall", *ENDS, "--stand-off", "0.01"), "--stand-off: no pose of the body"),
     ],
 )
 def test_what_is_impossible_is_refused(given, said, tmp_path, capsys):
     assert run_command_line([*given, "-o", str(tmp_path / "out"), "--workers", "1"]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_a_mesh_that_faces_the_other_way_is_refused(tmp_path, capsys):
+    flipped = tmp_path / "flipped.off"
+    flipped.write_text("OFF\n4 2 0\n0 0 0\n0 1 0\n1 0 0\n1 1 0\n3 0 2 1\n3 1 2 3\n")
+    assert run_command_line(["climb", str(flipped), *ENDS, "-o", str(tmp_path / "out")]) == 2
+    assert "crux: ROCK: hardly any rock faces −z of its frame; is" in capsys.readouterr().err
+    # as of many rocks
+    table = tmp_path / "climbs.csv"
+    assert run_command_line(["climb", str(flipped), *ENDS, "-o", str(table), "--workers", "1"]) == 2
+    (row,) = rows(table)
+    assert (row["error_kind"], row["error_field"]) == ("invalid", "ROCK")
 
 
 def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path, capsys):
@@ -100,7 +117,7 @@ def test_the_error_of_each_rock_is_in_its_place(tmp_path, capsys):
     assert json.loads(said.out)["errors"] == {"invalid": 3}
     assert said.err.startswith("crux: no-wall: ")
     assert "2 more rocks are bad input: small-wall:x, small-wall" in said.err
-    fields = ["file", "rock", "--lean"]
+    fields = ["ROCK", "ROCK", "--lean"]
     assert [each["error"]["field"] for each in lines(file)] == fields
     assert [each["id"] for each in lines(file)] == given[1:4]
     table = tmp_path / "climbs.csv"
@@ -151,7 +168,7 @@ def test_many_rocks_are_searched_in_processes_and_go_on_where_they_were_broken_o
     assert shown.index("found") < shown.index("error: invalid") < shown.index("none")
     found, wrong, none = lines(whole)
     assert (found["status"], none["status"]) == ("found", "none")
-    assert wrong["error"]["field"] == "file"
+    assert wrong["error"]["field"] == "ROCK"
     assert found["robot"] == none["robot"] == "robosimian"
     assert 1.0 <= found["least"] <= found["bound"]
     assert none["least"] is None
