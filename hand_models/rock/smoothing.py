@@ -182,6 +182,16 @@ def _reached(pieces: Sequence[Array], scale: Scale) -> list[Array]:
     return unstrung(points, ends)
 
 
+def _from_least(piece: Array) -> Array:
+    """Return an outline; a ring from where s is least on, to be seen as if it began there."""
+    if (piece[0] != piece[-1]).any():
+        return piece
+    ring = piece[:-1]
+    # of equal ones the highest, which hides no other
+    first = np.lexsort(ring.T[::-1])[0]
+    return np.concatenate([ring[first:], piece[: first + 1]])
+
+
 def _ahead(piece: Array, reach: float) -> list[Array]:
     """Return the parts of a polyline that a finger may reach, which begins at the origin, along s.
 
@@ -290,9 +300,10 @@ class OutlinedHold(Hold):
 
         scale, slack = self._scale, BASE_TOLERANCES.length
         middle = _reached(self._pieces(origin, s_axis, t_axis), scale)
-        points, stops, hidden = seen_outlines(*strung(middle)) if middle else _no_outlines()
+        outlines = [_from_least(piece) for piece in middle]
+        points, stops, hidden = seen_outlines(*strung(outlines)) if outlines else _no_outlines()
         if hidden > scale.bridged_gap:
-            near = [run for piece in middle for run in _ahead(piece, size.reach)]
+            near = [run for outline in outlines for run in _ahead(outline, size.reach)]
             hidden = seen_outlines(*strung(near))[2] if near else 0.0
         plane = np.array([origin, s_axis, t_axis], dtype=float)
         heights = self._heights(plane, size) if hidden <= scale.bridged_gap else None

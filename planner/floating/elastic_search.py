@@ -97,8 +97,10 @@ def _starts(hands: HandSets, factor: float, budget: Budget) -> Iterator[Linearis
     """Yield points at which a search may begin, the most promising first."""
     rest = replace(hands.at_rest(), factor=factor)
     if hands.springy:
-        # palms on their springs draw the search to where fingers hold little
-        yield find_wrists(hands.without_palms(), rest, budget, SETTINGS.rounds_nearby).point
+        # palms on their springs draw the search to where fingers hold little; half of the programs
+        # are for the hands as they are
+        part = budget.part(SETTINGS.first_programs // 2)
+        yield find_wrists(hands.without_palms(), rest, part, SETTINGS.rounds_nearby).point
     yield rest
     if hands.springy and hands.together is None:
         yield pressing(hands, factor)
@@ -176,14 +178,13 @@ def _relaxed(
 ) -> WristSolution:
     """Search for the least utilisation by relaxed programs, at rising prices."""
     point, goal = start, LEAST_USE
-    # where the least utilisation is worth more than a missing wrench, the price is too low
-    for price in (SETTINGS.price * rise for rise in (1.0, 10.0, 100.0, 1000.0)):
+    for price in _prices(hands):
         now, rounds, settled = _descended(hands, goal, point, price, budget, most)
         found, point = made_exact(hands, goal, now, rounds, budget), now.point
         if found.exact or budget.ended or not now.sets.finite:
             break
-        if now.measure.missing + now.measure.excess > 0.1:  # no equilibrium near
-            break
+        if _violation(now) > SETTINGS.far_off and not _too_cheap(hands, now, budget):
+            break  # no equilibrium near
     for _ in range(SETTINGS.restarts):
         if settled or not found.exact or budget.ended:
             break
@@ -210,7 +211,7 @@ def _descended(
 
     Returns where that ends, the rounds it took, and whether the sets there promise nothing better.
     """
-    within = 1.0  # one `TWIST_UNIT` and 100 N, for which linearised sets are good
+    within = SETTINGS.relaxed_range
     now = searching(hands, goal, start, within)
     firm = firm_rows(now.sets)
     merit, rounds, past = _merit(now, price), 0, [math.inf] * 6
@@ -256,7 +257,38 @@ def _merit(state: WristSolution, price: float) -> float:
     """Return the utilisation, and what is wrong at its price; infinite where rock is lost."""
     if not state.sets.finite:
         return math.inf
-    return state.measure.utilisation + price * (state.measure.missing + state.measure.excess)
+    return state.measure.utilisation + price * _violation(state)
+
+
+def _violation(state: WristSolution) -> float:
+    """Return the missing body wrench plus the violations of all hard rows, in their units."""
+    return state.measure.missing + state.measure.excess
+
+
+def _prices(hands: HandSets) -> list[float]:
+    """Return the rising prices of violations, none of them below what hands use at rest.
+
+    Where limits are weak, any load is worth more utilisation than a low price: a search at that
+    price would rather leave the body without balance.
+    """
+    prices = [SETTINGS.price * rise for rise in SETTINGS.rises]
+    at_rest = float(programs.used(hands.data, hands.at_rest().loads).max())
+    return [price for price in prices if price >= at_rest] or prices[-1:]
+
+
+def _too_cheap(hands: HandSets, state: WristSolution, budget: Budget) -> bool:
+    """Return whether sets about the end of a search promise less violation at a higher price.
+
+    Then the price was too low; otherwise the search ended for want of a balance.
+    """
+    near = searching(hands, LEAST_USE, state.point, SETTINGS.relaxed_range)
+    highest = SETTINGS.price * SETTINGS.rises[-1]
+    outcome = programs.elastic(near.sets.data, highest, near.point.loads, firm_rows(near.sets))
+    budget.spend()
+    if not outcome.solved:
+        return False
+    there = near.sets.measure(outcome.loads)
+    return there.missing + there.excess < (1.0 - SETTINGS.promise) * _violation(state)
 
 
 def firm_rows(sets: Sets) -> NDArray[np.bool_]:

@@ -55,6 +55,21 @@ class FloatingSettings:
     next_corrections: int = 3  # Newton steps of a round, at most; each squares the error
     price: float = 2.0
     """Price, as utilisation, of a `WRENCH_UNIT` of missing wrench or a `LOAD_UNIT` of violation."""
+    rises: tuple[float, ...] = (1.0, 10.0, 100.0, 1000.0)
+    """Multiples of the price: where balance costs more utilisation than a price, a search at that
+    price ends without balance, and the next goes on at a higher one."""
+    far_off: float = 0.1
+    """Missing wrench and violations, in their units, from which a higher price is tried only if it
+    promises to lower them: elsewhere the sets about the point have no balance."""
+    promise: float = 0.1
+    """Share of the violations that sets about a point must promise to remove at a higher price.
+
+    Steering of an exact penalty: Byrd, Nocedal and Waltz, Optimization Methods and Software 23,
+    2008. Promises of less are within the error of a linearised set."""
+    relaxed_range: float = 1.0
+    """Half width of the first trust region of relaxed programs, in `TWIST_UNIT`.
+
+    One `TWIST_UNIT` and 100 N, for which linearised sets are good."""
     small_factors: tuple[float, ...] = (0.5, 0.1)
     """Multiples of the body wrench to start the search from if the whole one has no plan."""
     better_branch: float = 2e-3

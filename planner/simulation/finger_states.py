@@ -6,9 +6,10 @@ balance what they did when the finger closed, N₀ and T₀ being the loads of t
 
     A N + B T = A N₀ + B T₀
 
-for each joint that contacts support. A phalanx that is off carries nothing, and the joint that it
-supported (its own, or else the nearest before it that is left) rests at a stop: its row goes. The
-hand's posture stays.
+for each joint that contacts support. Where a contact bears the share w of what balances its joint
+(`hand_models.finger.Contact`), all terms but those of its own normal load are taken w times. A
+phalanx that is off carries nothing, and the joint that it supported (its own, or else the nearest
+before it that is left) rests at a stop: its row goes. The hand's posture stays.
 """
 
 from __future__ import annotations
@@ -102,7 +103,6 @@ class FingerStates:
         gives = concatenated_allowances(batch)
         A, B = _moments(batch)
         T0, N0 = loads[own, 0], loads[own, 1]
-        balance = np.einsum("fij,fj->fi", A, N0) + np.einsum("fij,fj->fi", B, T0)
         joint_of, bears = _supports(batch)
         touching = (touch.touches[own] > 0.0)[:, None]
         framed = (touch.framed[own] > 0.0)[:, None]
@@ -111,11 +111,15 @@ class FingerStates:
         lifted = ~held & ~drags
         # rows: of each phalanx the joint that it supports
         row = np.arange(count)[:, None]
-        arms, rubs, due = A[row, joint_of], B[row, joint_of], balance[row, joint_of]
-        given = np.where(held & (touching & ~dragging[own][:, None]), T0[:, None], 0.0)
-        drags |= held & dragging[own][:, None]
-        M = arms[:, None] + rubs[:, None] * np.where(drags, friction[:, None], 0.0)[:, :, None]
-        right = due[:, None] - np.einsum("fij,fsj->fsi", rubs, given)
+        arms, rubs, share = A[row, joint_of], B[row, joint_of], batch.bearing_shares
+        gone = dragging[own]
+        due = _rows(arms, rubs, share, np.where(gone, friction, 0.0)) @ N0[..., None]
+        due = due[..., 0] + share * np.einsum("fij,fj->fi", rubs, np.where(gone, 0.0, T0))
+        given = np.where(held & touching & ~gone[:, None], T0[:, None], 0.0)
+        drags |= held & gone[:, None]
+        mu = np.where(drags, friction[:, None], 0.0)
+        M = _rows(arms[:, None], rubs[:, None], share[:, None], mu)
+        right = due[:, None] - share[:, None] * np.einsum("fij,fsj->fsi", rubs, given)
         idle = lifted | ~bears[:, None]
         M = np.where(idle[..., None], np.eye(3), np.where(idle[:, :, None], 0.0, M))
         bad = np.abs(np.linalg.det(M)) < FINGER_STATE_SETTINGS.singular
@@ -141,8 +145,8 @@ class FingerStates:
         slips = rests[row[:, None], np.where(held & touching & ~drags, slipped, rests[..., None])]
         lifts = np.zeros((count, 27), dtype=bool)
         first, at = places.base_fingers, places.bases
-        mu, share = batch.friction[at, None], batch.engagement[at, None]
-        pressed = loads[at, :1] + mu * share * N[first, :, 0] + gives[at, None]
+        mu, spines = batch.friction[at, None], batch.engagement[at, None]
+        pressed = loads[at, :1] + mu * spines * N[first, :, 0] + gives[at, None]
         lifts[first] = (pressed < -tolerance) & (touch.touches[at, None] > 0.0)
         return cls(T, np.asarray(N, dtype=float), rests, slips, lifts)
 
@@ -150,6 +154,22 @@ class FingerStates:
 def concatenated_allowances(batch: HandBatch) -> Array:
     """Return the drag allowances of all tiles, shape (T,) [N]; see `SettledHand`."""
     return np.concatenate([hand.drag_allowances for hand in batch.hands])
+
+
+def _rows(arms: Array, rubs: Array, share: Array, friction: Array) -> Array:
+    """Return the rows of the joints' balance over normal loads, shape (…, 3, 3) [m].
+
+    Parameters
+    ----------
+    arms, rubs : ndarray, shape (…, 3, 3)
+        Moments of unit normals and of unit shears about the joint that each phalanx supports [m].
+    share : ndarray, shape (…, 3)
+        Share of what balances its joint that each contact bears.
+    friction : ndarray, shape (…, 3)
+        μ of phalanges that drag, zero for the others.
+    """
+    whole = arms + rubs * friction[..., None, :]
+    return np.asarray(np.where(np.eye(3, dtype=bool), whole, share[..., None] * whole))
 
 
 def _moments(batch: HandBatch) -> tuple[Array, Array]:

@@ -170,6 +170,22 @@ def test_a_plan_that_it_overloads_names_the_joint(wrist):
     assert " N·m of 0.004 N·m about its phalanx" in answer.reason
 
 
+@pytest.mark.slow
+def test_however_weak_a_joint_compliant_hands_find_their_balance_with_the_same_twist():
+    """A balance knows no limit, and where twist is all that counts, the least is the same."""
+    asked = question(read_request("boulders"))
+    hands = tuple(replace(hand, wrist="compliant") for hand in asked.stance.hands)
+    found = []
+    for limit in (2e-3, 5e-4, 1e-4):
+        weak = with_hand(asked.stance.robot, changed_hand("structure", FINGER_TWIST, limit))
+        answer = plan(replace(asked, stance=replace(asked.stance, robot=weak, hands=hands)))
+        assert answer.status == "overloaded"
+        assert answer.limiting.limit == FINGER_TWIST
+        found.append(answer.utilisation * limit)
+    # searches end at kinks some per cent from the least
+    assert max(found) <= 1.03 * min(found)
+
+
 def test_the_check_of_plans_knows_it():
     """The plan of hands that bear it, checked for hands that bear less."""
     asked = question(read_request("boulders"))

@@ -15,7 +15,7 @@ from hand_models.rock.compiled_outlines import least_heights, raised_outlines, s
 from hand_models.rock.surface import Triangles
 from hand_models.rock.triangles import weld
 from tests.suite.helpers.hands import HAND
-from tests.suite.helpers.rocks import fractal_wall
+from tests.suite.helpers.rocks import fractal_wall, random_mesh
 from tests.suite.helpers.shares import given_some
 
 seeds = st.integers(0, 2**32 - 1)
@@ -150,6 +150,23 @@ def test_what_stands_out_beside_a_sliver_in_the_plane_is_met() -> None:
     rock = Mesh(vertices, triangles, anywhere=True).finger_rock(*LEVEL, SIZE)
     for section in rock.sections:
         np.testing.assert_allclose(np.vstack(section.pieces)[:, 1], 0.0, atol=1e-12)
+
+
+@given_some(5, 40, seeds)
+def test_a_boulder_is_met_alike_whichever_of_its_triangles_comes_first(seed: int) -> None:
+    """Its outline in a plane is a ring, which begins at some triangle."""
+    rng = np.random.default_rng(seed)
+    rock, plane = random_mesh(rng), LEVEL.copy()
+    plane[0] = [rng.uniform(-0.05, 0.05), 0.0, -0.01]
+    met, (vertices, faces) = rock.finger_rock(*plane, SIZE), rock.triangles
+    if not len(met.strips.across) > 1:
+        # only the cut is smoothed, from where its ring begins
+        return
+    for _ in range(3):
+        again = Mesh(vertices, rng.permutation(faces)).finger_rock(*plane, SIZE)
+        for one, other in zip(met.sections, again.sections, strict=True):
+            for one_piece, piece in zip(one.pieces, other.pieces, strict=True):
+                np.testing.assert_allclose(piece, one_piece, atol=1e-9)
 
 
 def test_a_place_on_an_edge_of_rock_has_rock() -> None:

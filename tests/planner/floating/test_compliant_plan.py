@@ -14,7 +14,13 @@ from hand_models.parameters import own_draw, own_hand
 from hand_models.tile import Surface
 from planner.deadline import Budget
 from planner.floating.elastic_search import find_wrists, without_hindrance
-from planner.prepare import hand_space, prepare_stance, settle_hand
+from planner.prepare import (
+    HandSets,
+    LinearisationPoint,
+    hand_space,
+    prepare_stance,
+    settle_hand,
+)
 from planner.question import LimbStiffness, OpenLoopSettings, Question
 from planner.result import Plan
 from planner.robots import robosimian
@@ -285,18 +291,28 @@ def test_a_deadline_that_ends_the_extras_leaves_the_plan() -> None:
     assert "open_loop" in found.unfinished
 
 
+def random_start(hands: HandSets, rng: np.random.Generator) -> LinearisationPoint:
+    loads = []
+    for wrist in hands.wrists:
+        least, most = map(np.array, wrist.travel.bounds)
+        twist = least + (most - least) * rng.uniform(0.15, 0.85, 6)
+        loads.append(np.concatenate([rng.uniform(10.0, 120.0, 4), twist]))
+    return replace(hands.at_rest(), loads=tuple(loads))
+
+
+def test_searches_that_end_far_from_a_balance_go_on_from_there() -> None:
+    hands, rng = prepare_stance(asked("slab")).hands, np.random.default_rng(0)
+    starts = [random_start(hands, rng) for _ in range(15)]
+    for start in (starts[10], starts[14]):
+        assert find_wrists(hands, start, Budget(320)).exact
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["wall-300", "overhang", "slab", "boulders"])
 def test_random_starts_within_the_travel_end_alike(name: str) -> None:
     hands, rng = prepare_stance(asked(name)).hands, np.random.default_rng(0)
     used = []
-    for _ in range(20):
-        loads = []
-        for wrist in hands.wrists:
-            least, most = map(np.array, wrist.travel.bounds)
-            twist = least + (most - least) * rng.uniform(0.15, 0.85, 6)
-            loads.append(np.concatenate([rng.uniform(10.0, 120.0, 4), twist]))
-        start = replace(hands.at_rest(), loads=tuple(loads))
+    for start in [random_start(hands, rng) for _ in range(20)]:
         found = without_hindrance(hands, find_wrists(hands, start, Budget(320)), Budget(320))
         used.append(found.measure.utilisation if found.exact else np.inf)
     # some end at kinks some per cent away

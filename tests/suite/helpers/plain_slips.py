@@ -79,6 +79,10 @@ class PlainSlips:
                     A[row, column] -= shear * mu
                 elif kinds[k] == "holds":
                     b[row] += shear * drawn[k]
+            # a contact that bears a share takes that of what the others leave of its joint
+            mine, share = A[row, row], finger.contacts[j].bearing_share
+            A[row], b[row] = share * A[row], share * b[row]
+            A[row, row] = mine
         N = np.linalg.solve(A, b) if bears else b
         found = dict.fromkeys(own, (0.0, 0.0))
         for row, j in enumerate(bears):
