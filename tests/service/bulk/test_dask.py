@@ -17,10 +17,12 @@ import msgspec
 import pytest
 
 from hand_models.base import CruxError
+from planner import BodyGrid, PlaceGrid
 from service import sweep
 from service.bulk import evaluate
 from service.bulk.chunks import BulkSettings
 from service.commands.stances import read_request, read_route
+from service.requests import ClimbEnd, ClimbRequest
 from service.wire import ServiceName
 from tests.service.bulk.test_evaluation import CASES, encoded, timeless
 from tests.suite.helpers.checkout import ROOT
@@ -63,6 +65,26 @@ def test_routes_and_sweeps_come_to_the_same_on_a_cluster(client):
     alone, spread = (sweep(wall, varied, on=on) for on in ("here", client))
     assert spread.rows == alone.rows
     assert spread.borders == alone.borders
+
+
+def test_climbs_come_to_the_same_on_a_cluster(client):
+    ends = {"start": ClimbEnd(height=0.8), "goal": ClimbEnd(height=0.8)}
+    grids = {
+        "places": PlaceGrid(spacing=0.3),
+        "bodies": BodyGrid(spacing=0.3, stand_offs=(0.6,)),
+    }
+    asked = [
+        ClimbRequest(v=1, rock=f"small-wall:{seed}", at_least=1.2, **ends, **grids)
+        for seed in (1, 2)
+    ]
+    here, there = (
+        [json.loads(answer.payload) for answer in evaluate(asked, on, kind=ServiceName.CLIMB)]
+        for on in ("here", client)
+    )
+    for reply in (*here, *there):
+        del reply["seconds"]
+    assert there == here
+    assert [reply["status"] for reply in here] == ["none", "found"]
 
 
 def test_questions_without_end_go_to_a_cluster_as_they_are_answered(client):

@@ -19,7 +19,7 @@ from service.answering import dispatch
 from service.bulk import answer_chunk, answered, evaluate
 from service.bulk.chunks import BULK_SETTINGS, About, Setting, about, grouping_order, own_versions
 from service.bulk.pools import Here
-from service.requests import PlanRequest
+from service.requests import ClimbEnd, ClimbRequest, Mesh, PlanRequest
 from service.wire import Format
 from tests.suite.helpers import workshop
 from tests.suite.helpers.random_requests import random_request
@@ -238,3 +238,18 @@ def test_here_one_question_is_answered_at_a_time():
         answers = answered(asked(), pool)
         next(answers)
     assert len(taken) <= BULK_SETTINGS.windows_ahead * BULK_SETTINGS.window
+
+
+def test_the_rock_of_a_climb_may_be_a_file(tmp_path):
+    """Of a mesh that faces the other way, so that the answer is there at once."""
+    text = "OFF\n3 1 0\n0 0 0\n0 1 0\n1 0 0\n3 0 2 1\n"
+    (tmp_path / "rock.off").write_text(text)
+    ends = {"start": ClimbEnd(height=0.0), "goal": ClimbEnd(height=1.0)}
+    asked = [ClimbRequest(v=1, rock=Mesh(file="rock.off"), **ends)]
+
+    def field(**options):
+        (answer,) = evaluate(asked, "here", kind="climb", **options)
+        return json.loads(answer.payload)["error"]["field"]
+
+    assert field(folder=tmp_path) == "bodies.sample"
+    assert field().startswith("rock")

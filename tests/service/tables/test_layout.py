@@ -12,6 +12,7 @@ from rich.console import Console
 from service.tables import (
     VERBOSITY_KEY,
     console,
+    counted,
     in_order,
     name,
     number,
@@ -78,3 +79,9 @@ def test_a_quiet_command_prints_no_table_but_lines_of_a_result() -> None:
         "simulated all hold, share 0.50",
         "simulated none, share -",
     ]
+
+
+def test_numbers_of_things_read_well_for_none_and_one():
+    said = [counted(count, "body", "bodies") for count in (0, 1, 2, 1200)]
+    assert said == ["no bodies", "1 body", "2 bodies", "1,200 bodies"]
+    assert [counted(count, "move") for count in (1, 3)] == ["1 move", "3 moves"]
