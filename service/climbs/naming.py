@@ -48,6 +48,7 @@ def _name_options(error: CruxError | ErrorDetail) -> None:
         "surface": "--surface",
         "start": "--from",
         "goal": "--to",
+        "time": "--time",
     }
     for path, option in options.items():
         error.message = error.message.replace(f"({path})", f"({option})")

@@ -297,7 +297,8 @@ def complain(tally: bulk.Tally, where: Callable[[int], str], noun: str) -> None:
     if tally.first_bad is not None:
         index, error = tally.first_bad
         field = "" if error.field is None else f"{error.field}: "
-        more = f"; {tally.bad - 1} more {noun} are bad input" if tally.bad > 1 else ""
+        others = tables.counted(tally.bad - 1, f"more {noun[:-1]} is", f"more {noun} are")
+        more = f"; {others} bad input" if tally.bad > 1 else ""
         if named := [where(each) for each in tally.further_bad]:
             rest = ", …" if tally.bad - 1 > len(named) else ""
             more += f": {', '.join(named)}{rest}"

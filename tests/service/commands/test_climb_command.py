@@ -54,9 +54,11 @@ def test_a_mesh_that_faces_the_other_way_is_refused(tmp_path, capsys):
     assert "crux: ROCK: hardly any rock faces −z of its frame; is" in capsys.readouterr().err
     # as of many rocks
     table = tmp_path / "climbs.csv"
-    assert run_command_line(["climb", str(flipped), *ENDS, "-o", str(table), "--workers", "1"]) == 2
-    (row,) = rows(table)
-    assert (row["error_kind"], row["error_field"]) == ("invalid", "ROCK")
+    for options, field in (((), "ROCK"), (("--time", "601"), "--time")):
+        given = ["climb", str(flipped), *ENDS, "-o", str(table), "--workers", "1", *options]
+        assert run_command_line(given) == BAD_INPUT
+        (row,) = rows(table)
+        assert (row["error_kind"], row["error_field"]) == ("invalid", field)
 
 
 def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path, capsys):

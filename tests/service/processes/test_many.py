@@ -265,8 +265,7 @@ def test_lines_are_replies_or_errors_in_order(batch_file, capfd):
     ]
     assert [reply["id"] for reply in replies] == ["a", None, "c", "b"]
     assert err == (
-        "crux: line 3: not valid JSON: Input data was truncated; 1 more lines are bad input: "
-        "line 5\n"
+        "crux: line 3: not valid JSON: Input data was truncated; 1 more line is bad input: line 5\n"
     )
     alone = dispatch.answer_plan(decode_request(msgspec.json.encode(GOOD), PlanRequest))
     assert replies[0]["utilisation"] == pytest.approx(alone.utilisation, rel=1e-9)
