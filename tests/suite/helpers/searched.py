@@ -63,6 +63,7 @@ def _answer(
     return ClimbReply(
         id=request.id,
         name=request.name,
+        robot="robosimian",
         status="none",
         least=None,
         bound=0.9,
@@ -73,6 +74,7 @@ def _answer(
         about="nothing",
         route=None,
         stages=[],
+        knots=None,
         placements=0,
         bodies=0,
         programs=os.getpid(),
