@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from hand_models.sections.section import Complexes, Flags, Section
 from hand_models.sections.settings import SECTION_SETTINGS
 
 __all__ = ["Outlines"]
+
+_NO_LENGTH: Final = 1e-12
+"""Length of what is no rock [m]."""
 
 
 class Outlines(NamedTuple):
@@ -26,7 +29,8 @@ class Outlines(NamedTuple):
     points : ndarray of complex, shape (n, p)
         s + i t of places on the rock, one boundary curve after another [m].
     lengths : ndarray, shape (n, p)
-        Length of the rock's boundary that each point represents [m].
+        Length of the rock's boundary that each point represents [m]; beside the tiles the less, the
+        less the rock stands out of that under them.
     centres : ndarray of complex, shape (n, p / 16)
         Centre of a bounding circle of each block [m].
     radii : ndarray, shape (n, p / 16)
@@ -64,13 +68,13 @@ class Outlines(NamedTuple):
         """
         block = SECTION_SETTINGS.points_per_circle
         taken = [
-            [_points(section, reach, spacing) for section in (rock.tile, rock.frame)]
+            (_points(rock.tile, reach, spacing), _standing_out(rock, reach, spacing))
             for rock in rocks
         ]
         blocks = math.ceil(max([1, *(len(a[0]) + len(b[0]) for a, b in taken)]) / block)
         # what stands for no rock is 1 km away, and next to nothing long
         points = np.full((len(taken), blocks * block), complex(1e3))
-        lengths, bare = np.full(points.shape, 1e-12), np.zeros(points.shape, dtype=bool)
+        lengths, bare = np.full(points.shape, _NO_LENGTH), np.zeros(points.shape, dtype=bool)
         for i, (under, beside) in enumerate(taken):
             for values, own, more in zip((points, lengths), under, beside, strict=True):
                 values[i, : len(own) + len(more)] = np.concatenate([own, more])
@@ -93,6 +97,18 @@ class Outlines(NamedTuple):
         radii = np.abs(in_blocks - centres[..., None]).max(axis=-1)
         longest = lengths.reshape(in_blocks.shape).max(axis=-1)
         return cls(points, lengths, centres, radii, longest, bare, places, ways, behind, across)
+
+
+def _standing_out(rock: FingerRock, reach: float, spacing: float) -> tuple[Complexes, Array]:
+    """Return places of the rock beside the tiles, and their lengths as of `Outlines`.
+
+    What does not stand out of the rock under the tiles is there already, and counts once.
+    """
+    places, lengths = _points(rock.frame, reach, spacing)
+    if rock.tile is not None and len(places):
+        out = rock.tile.clearances(places) / SECTION_SETTINGS.standing_out
+        lengths = np.maximum(lengths * np.clip(out, 0.0, 1.0), _NO_LENGTH)
+    return places, lengths
 
 
 def _points(section: Section | None, reach: float, spacing: float) -> tuple[Complexes, Array]:

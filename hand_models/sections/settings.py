@@ -31,6 +31,9 @@ class SectionSettings:
     envelope_end: float = 1e3
     """Multiple of a finger's reach beyond which an outline ends: along a log it would go on until
     rounding lets the axis of the log slope, by 10¹⁵ m."""
+    standing_out: float = 1e-4
+    """Height by which rock beside the tiles stands out of the rock under them from which on it
+    counts with its whole length [m]: a tile's bed is pressed in by 0.07 to 0.2 mm."""
     most_circles: int = 10
     """Largest number of circles fitted to an ellipse in turn; two or three are mostly enough."""
     last_turn: float = 1e-8

@@ -183,8 +183,10 @@ def _relaxed(
         found, point = made_exact(hands, goal, now, rounds, budget), now.point
         if found.exact or budget.ended or not now.sets.finite:
             break
-        if _violation(now) > SETTINGS.far_off and not _too_cheap(hands, now, budget):
-            break  # no equilibrium near
+        if _violation(now) > SETTINGS.far_off:
+            if not _too_cheap(hands, now, budget):
+                break  # no equilibrium near
+            point = start  # not from where too low a price has led
     for _ in range(SETTINGS.restarts):
         if settled or not found.exact or budget.ended:
             break
@@ -266,14 +268,14 @@ def _violation(state: WristSolution) -> float:
 
 
 def _prices(hands: HandSets) -> list[float]:
-    """Return the rising prices of violations, none of them below what hands use at rest.
+    """Return the rising prices of violations, all well above what hands use at rest.
 
-    Where limits are weak, any load is worth more utilisation than a low price: a search at that
-    price would rather leave the body without balance.
+    Where limits are weak, any load costs more utilisation than a low price: a search at that price
+    would rather leave the body without balance.
     """
     prices = [SETTINGS.price * rise for rise in SETTINGS.rises]
     at_rest = float(programs.used(hands.data, hands.at_rest().loads).max())
-    return [price for price in prices if price >= at_rest] or prices[-1:]
+    return [price for price in prices if price >= SETTINGS.beyond_rest * at_rest] or prices[-1:]
 
 
 def _too_cheap(hands: HandSets, state: WristSolution, budget: Budget) -> bool:

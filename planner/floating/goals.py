@@ -58,6 +58,8 @@ class FloatingSettings:
     rises: tuple[float, ...] = (1.0, 10.0, 100.0, 1000.0)
     """Multiples of the price: where balance costs more utilisation than a price, a search at that
     price ends without balance, and the next goes on at a higher one."""
+    beyond_rest: float = 4.0
+    """Least price over what hands use at rest: plans of bundled stances use some ten times that."""
     far_off: float = 0.1
     """Missing wrench and violations, in their units, from which a higher price is tried only if it
     promises to lower them: elsewhere the sets about the point have no balance."""

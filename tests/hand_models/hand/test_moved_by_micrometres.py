@@ -7,11 +7,12 @@ import pytest
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from hand_models import Grasp, InvalidInputError, Pose, Surface
+from hand_models import Cylinder, Grasp, InvalidInputError, Pose, Surface
+from hand_models.fixed_wrist import wrench_spaces
 from hand_models.hand import Placement
 from hand_models.rock import Mesh, Profile
 from tests.suite.helpers.hands import HAND
-from tests.suite.helpers.moved_hands import random_placement, scanned
+from tests.suite.helpers.moved_hands import DIRECTIONS, Scan, random_placement, scanned
 from tests.suite.helpers.rocks import random_mesh
 from tests.suite.helpers.shares import given_some
 
@@ -83,6 +84,37 @@ def test_a_phalanx_across_a_gap_keeps_its_spines_on_a_shallow_bowl():
         scan = scanned(placement, np.array([0.0, 0.0, 1.0]), range(place - 1, place + 2))
         assert scan.flips() == []
         assert scan.steps().max() < STEP
+
+
+ALONG = [
+    (0.0, 0.0132, -0.00461),
+    (math.pi, 0.0196, 0.00595),
+    (math.pi, 0.0129, 0.0071),
+    (2.7, -0.0032, 0.0051),
+]
+"""Angles of outer fingers on a log, and places off the seat along x and z [m]: phalanges press with
+their ends, or are laid."""
+
+
+@pytest.mark.parametrize(("outer_rotation", "x", "z"), ALONG)
+def test_rock_that_becomes_alike_across_fingers_is_held_alike(
+    outer_rotation: float, x: float, z: float
+) -> None:
+    """Up to a microradian between finger and log, rock has one outline for tiles and frames."""
+    log, surface, grasp = Cylinder(0.3), Surface.named("rock"), Grasp(outer_rotation)
+    seat = HAND.settle(log, surface, grasp).seating.pose
+    hands = []
+    for yaw in (0.0, 0.9e-6, 1.7e-6, 3e-6):
+        turn = Rotation.from_rotvec([0.0, 0.0, yaw]).as_matrix()
+        there = Pose(seat.position + np.array([x, 0.0, z]), turn @ seat.rotation)
+        hands.append(HAND.settle(log, surface, grasp, there))
+    kinds = np.array([hand.postures.kinds.ravel() for hand in hands])
+    supports = [[space.support(d) for d in DIRECTIONS] for space in wrench_spaces(hands)]
+    assert (kinds == kinds[0]).all()
+    assert Scan(kinds, np.array(supports)).steps().max() < 1e-3
+    alongs = [hand.postures.alongs.ravel() for hand in hands]
+    # a tenth of the distance of points by which smooth rock across a finger is measured
+    np.testing.assert_allclose(alongs, alongs[0][None].repeat(4, axis=0), atol=5e-5)
 
 
 @pytest.mark.slow

@@ -322,6 +322,20 @@ def test_random_starts_within_the_travel_end_alike(name: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("weaker", [5.0, 10.0, 100.0])
+def test_spines_that_hold_less_are_used_more_in_proportion(weaker: float) -> None:
+    """Balance knows no limit, and here tiles alone limit the hands."""
+    question, hands = asked(), []
+    for hand in question.stance.hands:
+        names = ("shear_limit", "pull_off_limit", "lateral_limit")
+        less = {name: getattr(hand.surface, name) / weaker for name in names}
+        hands.append(replace(hand, surface=replace(hand.surface, **less)))
+    found = plan(replace(question, stance=replace(question.stance, hands=tuple(hands))))
+    assert found.status == "overloaded"
+    assert found.utilisation == pytest.approx(weaker * answered().utilisation, rel=2e-3)
+
+
+@pytest.mark.slow
 def test_hands_a_hair_aside_give_much_the_same_plan() -> None:
     question, rng, used = asked(), np.random.default_rng(1), []
     for _ in range(12):
