@@ -87,14 +87,35 @@ def reached(points: Array, stops: Indices, reach: float) -> tuple[Array, Indices
     return found[:total], ends[:runs], length
 
 
-@compiled("f2", "i1")
-def seen_outlines(points: Array, stops: Indices) -> tuple[Array, Indices, float]:
-    """Return what is seen of outlines along t, and how far overhangs hide rock at most.
+@compiled()
+def _near_part(a: Array, b: Array, reach: float, begin: float) -> tuple[float, float]:
+    """Return the least and the largest s ≥ ``begin`` of a segment within reach; NaN if none."""
+    ds, dt = b[0] - a[0], b[1] - a[1]
+    square, along = ds * ds + dt * dt, a[0] * ds + a[1] * dt
+    inside = along * along - square * (a[0] * a[0] + a[1] * a[1] - reach * reach)
+    if square > 0.0 and inside >= 0.0:
+        first = max((-along - math.sqrt(inside)) / square, 0.0)
+        last = min((-along + math.sqrt(inside)) / square, 1.0)
+        low, high = a[0] + first * ds, a[0] + last * ds
+        low, high = max(min(low, high), begin), max(low, high)
+        if first <= last and low <= high:
+            return low, high
+    return math.nan, math.nan
+
+
+@compiled("f2", "i1", "f0")
+def seen_outlines(points: Array, stops: Indices, reach: float) -> tuple[Array, Indices, float]:
+    """Return what is seen of outlines along t, and how far overhangs hide rock from a finger.
+
+    A finger begins at the origin, along s, and curls toward −s as it closes. So it may reach under
+    a lip that ends the rock toward +s, even one behind the origin, and before the origin under any.
 
     Parameters
     ----------
     points, stops : ndarray
         Outlines (s, t), rock on their left [m].
+    reach : float
+        Distance from the origin beyond which a finger reaches nothing [m].
 
     Returns
     -------
@@ -102,12 +123,14 @@ def seen_outlines(points: Array, stops: Indices) -> tuple[Array, Indices, float]
         Outlines with s ascending, with an upright piece at each overhang [m]; each outline by
         itself, whatever others hide of it.
     hidden : float
-        Largest distance along s from an overhang's lip to the rock that it hides [m].
+        Largest distance along s from an overhang's lip to the rock that it hides, both where a
+        finger may reach them [m].
     """
     found, ends = np.empty((3 * len(points), 2)), np.empty_like(stops)
     hidden, total, start = 0.0, 0, 0
     for piece in range(len(stops)):
-        begin, lip, turned, under, back = total, 0.0, 0.0, False, False
+        begin, under, back = total, False, False
+        lip = edge = math.nan
         for i in range(start, stops[piece]):
             s, t = points[i]
             if total == begin:
@@ -115,37 +138,39 @@ def seen_outlines(points: Array, stops: Indices) -> tuple[Array, Indices, float]
                 total += 1
                 continue
             before = points[i - 1]
-            if under:
-                hidden = max(hidden, lip - s)
-                if s > lip:
-                    part = (lip - before[0]) / (s - before[0])
-                    found[total, 0], found[total, 1] = lip, before[1] + part * (t - before[1])
-                    found[total + 1] = points[i]
-                    total += 2
-                    under = False
+            if under and s > lip:
+                part = (lip - before[0]) / (s - before[0])
+                found[total, 0], found[total, 1] = lip, before[1] + part * (t - before[1])
+                found[total + 1] = points[i]
+                total += 2
+                under = False
                 continue
-            if s >= before[0]:
+            if not under and s >= before[0]:
                 back = False
                 found[total] = points[i]
                 total += 1
                 continue
-            if not back and i > start + 1:
-                old = points[i - 2]
-                turn = (before[0] - old[0]) * (t - before[1]) - (before[1] - old[1]) * (
-                    s - before[0]
-                )
-                # a lip is where the outline turns back to the left, into the rock
-                under = turn > 0.0
-            elif not back:
-                under = t > before[1]
+            if not under and not back:
+                if i > start + 1:
+                    old = points[i - 2]
+                    turn = (before[0] - old[0]) * (t - before[1]) - (before[1] - old[1]) * (
+                        s - before[0]
+                    )
+                    # a lip is where the outline turns back to the left, into the rock
+                    under = turn > 0.0
+                else:
+                    under = t > before[1]
+                back, lip = not under, before[0]
+                # the lip, or where rock begins that is passed again, if within reach
+                edge = lip if under and math.hypot(before[0], before[1]) <= reach else math.nan
+            least, most = _near_part(before, points[i], reach, -math.inf if under else 0.0)
+            if back and math.isnan(edge):
+                edge = most
+            if edge - least > hidden:
+                hidden = edge - least
             if under:
-                lip = before[0]
-                hidden = max(hidden, lip - s)
                 continue
             # it comes back out over rock that it has passed
-            turned = turned if back else before[0]
-            back = True
-            hidden = max(hidden, turned - s)
             top = found[total - 1]
             while total > begin and found[total - 1, 0] > s:
                 top = found[total - 1]
@@ -207,6 +232,25 @@ def _raised(t: float, own: float, least: float) -> float:
     return t - (own - least) if own < math.inf else min(t, least)
 
 
+@compiled()
+def _raised_between(t: float, part: float, own: Array, least: Array) -> float:
+    """Return t raised as the plane's rock at two places beside it is, at a part of the way between.
+
+    It is as far from the envelope's chord as from its own rock's, in proportion less where that is
+    steeper; but it stands out of both places, or lies behind both, by no more than there. Where the
+    plane's rock ends it is raised to the chord at most.
+    """
+    chord = least[0] + part * (least[1] - least[0])
+    low, high = min(own[0], own[1]), max(own[0], own[1])
+    if high == math.inf:
+        return float(min(t, chord))
+    first, last, inside = min(least[0], least[1]), max(least[0], least[1]), min(max(t, low), high)
+    off = inside - (own[0] + part * (own[1] - own[0]))
+    if high - low > last - first:
+        off *= (last - first) / (high - low)
+    return float(min(max(chord + off, first), last) + (t - inside))
+
+
 @compiled("f2", "f1", "f1", "f1", "f3", "f0", "f0")
 def raised_outlines(
     points: Array, s: Array, own: Array, least: Array, ends: Array, gap: float, slack: float
@@ -245,7 +289,13 @@ def raised_outlines(
         while corner < len(points) and points[corner, 0] < s[i]:
             here, t = points[corner]
             corner += 1
-            # the envelope on both sides: at a place with rock, or where it ends before the next
+            if rock and not alone:
+                part = (here - s[i - 1]) / (s[i] - s[i - 1])
+                raised = _raised_between(t, part, own[i - 1 : i + 1], least[i - 1 : i + 1])
+                found[total, 0], found[total, 1] = here, raised
+                total += 1
+                continue
+            # between a place with rock, and where the envelope ends before the next
             low, high, before, after = math.nan, math.nan, 0.0, 0.0
             if not alone:
                 low, before = s[i - 1], _raised(t, own[i - 1], least[i - 1])

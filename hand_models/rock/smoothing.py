@@ -192,16 +192,6 @@ def _from_least(piece: Array) -> Array:
     return np.concatenate([ring[first:], piece[: first + 1]])
 
 
-def _ahead(piece: Array, reach: float) -> list[Array]:
-    """Return the parts of a polyline that a finger may reach, which begins at the origin, along s.
-
-    Rock behind its first joint is none of it.
-    """
-    near = (piece[:, 0] >= 0.0) & (np.hypot(*piece.T) <= reach)
-    parts = np.flatnonzero(np.diff(near)) + 1
-    return [run for run in np.split(piece, parts)[not near[0] :: 2] if len(run) > 1]
-
-
 def _no_outlines() -> tuple[Array, Indices, float]:
     """Return the result of `seen_outlines` where there is no rock in the plane."""
     return np.zeros((0, 2)), np.zeros(0, dtype=np.intp), 0.0
@@ -277,9 +267,8 @@ class OutlinedHold(Hold):
         """Return the envelope of the rock across a finger's width, in the finger's plane, smoothed.
 
         The envelope is the least t of the rock across the tiles, and across the phalanges' frames.
-        Where rock reaches back under an overhang in the finger's plane by more than a bridged gap,
-        before the plane's origin and within the finger's reach, only the cut in this plane is used.
-        Arguments are those of `Hold.finger_rock`.
+        Where the finger may reach under an overhang in its plane by more than a bridged gap, only
+        the cut in this plane is used. Arguments are those of `Hold.finger_rock`.
 
         Returns
         -------
@@ -301,10 +290,9 @@ class OutlinedHold(Hold):
         scale, slack = self._scale, BASE_TOLERANCES.length
         middle = _reached(self._pieces(origin, s_axis, t_axis), scale)
         outlines = [_from_least(piece) for piece in middle]
-        points, stops, hidden = seen_outlines(*strung(outlines)) if outlines else _no_outlines()
-        if hidden > scale.bridged_gap:
-            near = [run for outline in outlines for run in _ahead(outline, size.reach)]
-            hidden = seen_outlines(*strung(near))[2] if near else 0.0
+        points, stops, hidden = _no_outlines()
+        if outlines:
+            points, stops, hidden = seen_outlines(*strung(outlines), size.reach)
         plane = np.array([origin, s_axis, t_axis], dtype=float)
         heights = self._heights(plane, size) if hidden <= scale.bridged_gap else None
         if heights is None:

@@ -19,6 +19,7 @@ from hand_models import (
     Sphere,
 )
 from hand_models.finger import PHALANGES
+from hand_models.finger.phalanx_shape import PhalanxShape
 from hand_models.hand import Placement
 from tests.suite.helpers.hands import HAND, PINCH, ROCK, pinch, seating_on, settled_at
 from tests.suite.helpers.rocks import in_hand
@@ -204,16 +205,52 @@ def test_tiles_move_continuously_as_the_outer_fingers_turn(hold):
     assert sum(a.tiles != b.tiles for a, b in itertools.pairwise(hands)) <= 20
 
 
-@given_some(5, 100, seeds)
-def test_tiles_said_to_touch_are_on_the_rock(seed):
+def across_tiles(settled, places):
+    """Distances [m] of rock from places (n, 3) in H, one a tile, moved across it, (n, y)."""
+    frames = settled.hand.frames(settled.grasp.outer_rotation)
+    ways = np.array([frames[i].across for i in settled.finger_of])
+    joints = np.array([frames[i].joint for i in settled.finger_of])
+    middles = places - ((places - joints) * ways).sum(axis=1)[:, None] * ways
+    y = settled.hand.finger.tile_width * np.linspace(-0.5, 0.5, 201)
+    points = middles[:, None] + y[:, None] * ways[:, None]
+    return in_hand(settled.hold, settled.seating.pose, points)
+
+
+def most_engaged(settled):
+    """The largest shares of the phalanges' tiles that distances allow, (12,): in space, not across.
+
+    A strip's spines reach the rock of the strip, which is no nearer than any.
+    """
+    shape, strips = PhalanxShape.of(settled.hand.finger), settled.hand.finger.size.strips
+    along = np.linspace(shape.near, shape.far, 97) + 1j * shape.lift
+    found = []
+    frames = settled.hand.frames(settled.grasp.outer_rotation)
+    for frame, finger in zip(frames, settled.fingers, strict=True):
+        for contact in finger.contacts:
+            places = complex(*contact.joint) + along * np.exp(1j * contact.angle)
+            points = frame.joint + np.multiply.outer(places.real, frame.along)
+            points[:, 2] += places.imag
+            points = points[:, None] + strips[:, None] * frame.across
+            away = in_hand(settled.hold, settled.seating.pose, points).min(axis=0) - shape.radius
+            found.append(np.clip(1.0 - away / shape.travel, 0.0, 1.0).mean())
+    return np.array(found)
+
+
+def assert_on_rock(seed):
     settled = settled_at(seed)
     if settled is None:
         return
     on = settled.touching
+    bases = np.array([tile.phalanx == "base" for tile in settled.tiles])
     clearance = in_hand(settled.hold, settled.seating.pose, settled.positions)
-    # where their bed presses; spines reach across gaps
     assert (clearance[on] > -5e-5).all()
-    assert (clearance[on] < HAND.spine_travel + 1e-9).all()
+    # spines reach across gaps. Base tiles meet the rock at one point; others are where their bed
+    # presses, with one of their sides, and the middle of their spines on rock may be farther off
+    assert (clearance[on & bases] < HAND.spine_travel + 1e-9).all()
+    clearances = across_tiles(settled, settled.positions)[on & ~bases]
+    assert (clearances > -5e-5).all()
+    assert (clearances.min(axis=1) < HAND.spine_travel + 1e-9).all()
+    assert (settled.engagement[~bases] <= most_engaged(settled) + 1e-4).all()
     # all of them where the tile touches
     whole = on & (settled.engagement == 1.0)
     assert (clearance[whole] < 1e-3).all()
@@ -222,6 +259,26 @@ def test_tiles_said_to_touch_are_on_the_rock(seed):
             assert abs(place[2]) <= 0.005 + 1e-12
     z = np.column_stack([HAND.palm_tiles[:, :2], settled.palm.gaps])[list(settled.palm.engaged)]
     np.testing.assert_allclose(in_hand(settled.hold, settled.seating.pose, z), 0.0, atol=1e-9)
+
+
+@given_some(5, 100, seeds)
+def test_tiles_said_to_touch_are_on_the_rock(seed):
+    assert_on_rock(seed)
+
+
+def test_a_tile_with_spines_on_the_rock_at_one_side_only_is_on_it_there():
+    """Its outermost strip is 4.93 mm off, its middle 5.5 mm: beyond the spines' travel."""
+    assert_on_rock(459)
+    settled = settled_at(459)
+    (tile,) = (
+        i
+        for i, each in enumerate(settled.tiles)
+        if (each.finger, each.phalanx) == ("outer_right", "middle")
+    )
+    clearances = across_tiles(settled, settled.positions)[tile]
+    assert clearances[100] > HAND.spine_travel > clearances.min()
+    assert 0.0 < settled.engagement[tile] < 1.0 / len(HAND.finger.size.strips)
+    assert clearances[-1] == clearances.min()
 
 
 def test_rock_stands_no_deeper_in_the_palm_than_spines_retract():

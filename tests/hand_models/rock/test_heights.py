@@ -94,8 +94,9 @@ def test_what_is_seen_of_an_outline_is_its_least_t_everywhere(seed: int) -> None
     rng = np.random.default_rng(seed)
     line = overhanging(rng)
     if seed % 2:
-        line = np.ascontiguousarray((line * [-1.0, 1.0])[::-1])
-    points, stops, hidden = seen_outlines(line, np.array([len(line)]))
+        # under lips that end the rock toward −s fingers reach before their joint only
+        line = np.ascontiguousarray((line * [-1.0, 1.0])[::-1]) + np.array([0.1, 0.0])
+    points, stops, hidden = seen_outlines(line, np.array([len(line)]), math.inf)
     assert (np.diff(points[:, 0]) >= 0.0).all()
     at = np.linspace(line[:, 0].min(), line[:, 0].max(), 997)[1:-1]
     begin, end = line[:-1], line[1:]
@@ -117,13 +118,41 @@ def test_what_is_seen_of_an_outline_is_its_least_t_everywhere(seed: int) -> None
 def test_an_overhang_is_closed_by_an_upright_piece() -> None:
     # a roof that ends at s = 3, rock 1 under it from s = 1 on
     roof = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 0.2], [1.0, 0.2], [1.0, 1.0], [5.0, 1.0]])
-    points, _, hidden = seen_outlines(roof, np.array([6]))
+    points, _, hidden = seen_outlines(roof, np.array([6]), math.inf)
     assert hidden == pytest.approx(2.0)
     np.testing.assert_allclose(points, [[0, 0], [3, 0], [3, 0.2], [3, 1], [5, 1]])
-    mirrored = np.ascontiguousarray((roof * [-1.0, 1.0])[::-1])
-    points, _, hidden = seen_outlines(mirrored, np.array([6]))
+    mirrored = np.ascontiguousarray((roof * [-1.0, 1.0])[::-1]) + np.array([5.0, 0.0])
+    points, _, hidden = seen_outlines(mirrored, np.array([6]), math.inf)
     assert hidden == pytest.approx(2.0)
-    np.testing.assert_allclose(points, [[-5, 1], [-3, 1], [-3, 0.2], [-3, 0], [0, 0]])
+    np.testing.assert_allclose(points, [[0, 1], [2, 1], [2, 0.2], [2, 0], [5, 0]])
+
+
+@pytest.mark.parametrize(
+    ("begin", "facing", "reach", "hidden"),
+    [
+        # a lip at s = 3, rock 1 under it from s = 1 on; the outline passes s = 1 at t = 0.2
+        (0.0, 1.0, math.inf, 2.0),
+        (0.0, 1.0, 3.1, 2.0),
+        # no finger passes a lip beyond its reach
+        (0.0, 1.0, 2.9, 0.0),
+        # a finger curls back under a lip behind its joint, as far as it reaches
+        (-4.0, 1.0, math.inf, 2.0),
+        (-4.0, 1.0, math.hypot(2.5, 0.2), 1.5),
+        # it does not turn away from its hand: under such a lip it reaches before its joint only
+        (-5.0, -1.0, math.inf, 0.0),
+        (-3.5, -1.0, math.inf, 0.5),
+        (1.0, -1.0, math.inf, 2.0),
+        (1.0, -1.0, math.hypot(4.0, 0.2), 1.0),
+    ],
+)
+def test_overhangs_hide_rock_where_a_finger_reaches_it(
+    begin: float, facing: float, reach: float, hidden: float
+) -> None:
+    roof = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 0.2], [1.0, 0.2], [1.0, 1.0], [5.0, 1.0]])
+    if facing < 0.0:
+        roof = (roof * [-1.0, 1.0])[::-1] + np.array([5.0, 0.0])
+    line = np.ascontiguousarray(roof + np.array([begin, 0.0]))
+    assert seen_outlines(line, np.array([6]), reach)[2] == pytest.approx(hidden, abs=1e-12)
 
 
 def sheet(low: float, high: float, z: float) -> tuple[np.ndarray, np.ndarray]:
@@ -195,3 +224,32 @@ def test_rock_ends_where_its_triangles_do(turn: float) -> None:
     outline, stops = raised_outlines(np.zeros((0, 2)), PLACES, least, least, ends, 0.005, 1e-9)
     assert len(stops) == 1
     np.testing.assert_allclose(outline[-1], [(end + half * abs(s)) / c, 0.0], atol=1e-12)
+
+
+@given_some(20, 200, seeds)
+def test_corners_between_places_are_raised_no_farther_than_what_is_beside_them(seed: int) -> None:
+    """However steep the rock is: on a face that is all but upright a spike would be centimetres."""
+    rng = np.random.default_rng(seed)
+    fall = 10.0 ** rng.uniform(-4.0, -1.5, len(PLACES) - 1) * rng.choice([-1.0, 1.0])
+    own = np.cumsum(np.append(0.0, fall))
+    least = own - rng.uniform(0.0, 0.03) * rng.random(len(own))
+    alike = rng.random(len(own)) < 0.5
+    least[alike] = own[alike]
+    cell = np.sort(rng.integers(0, len(PLACES) - 1, 300))
+    s = PLACES[cell] + rng.uniform(0.05, 0.95, 300) * np.diff(PLACES)[cell]
+    cell, s = cell[np.argsort(s)], np.sort(s)
+    (low, high), (first, last) = (
+        np.sort([each[cell], each[cell + 1]], axis=0) for each in (own, least)
+    )
+    t = low + rng.uniform(-0.5, 1.5, 300) * (high - low)
+    ends = np.full((2, len(PLACES), 2), np.nan)
+    outline, _ = raised_outlines(np.column_stack([s, t]), PLACES, own, least, ends, 0.005, 0.0)
+    corners = outline[np.isin(outline[:, 0], s)]
+    np.testing.assert_array_equal(corners[:, 0], s)
+    raised, slack = corners[:, 1], 1e-12
+    assert (raised <= t + slack).all()
+    assert (raised >= first - np.maximum(low - t, 0.0) - slack).all()
+    assert (raised <= last + np.maximum(t - high, 0.0) + slack).all()
+    same = alike[cell] & alike[cell + 1]
+    assert same.any()
+    np.testing.assert_allclose(raised[same], t[same], atol=slack)

@@ -196,8 +196,8 @@ def test_a_palm_inside_the_rock_is_told_how_deep():
     assert hold.entry([0.0, 0.0, 0.35], Z) == math.inf
 
 
-@given_some(5, 50, seeds)
-def test_tiles_rest_on_the_rock_and_not_in_it(seed):
+def assert_on_rock(seed):
+    """That tiles of a hand on a random mesh or profile are on it, and not in it."""
     rng = np.random.default_rng(seed)
     hold = random_mesh(rng) if rng.random() < 0.6 else random_profile(rng)
     settled = HAND.settle(hold, ROCK, Grasp(float(rng.choice([0.0, 1.0, math.pi]))))
@@ -216,6 +216,21 @@ def test_tiles_rest_on_the_rock_and_not_in_it(seed):
             if contact.kind in ("face", "edge"):
                 aside = np.linspace(-0.0107, 0.0107, 9)[:, None, None] * frame.across
                 assert distance(hold, in_hold.apply(middle + aside)).min() < 5.5e-3
+
+
+@given_some(5, 50, seeds)
+def test_tiles_rest_on_the_rock_and_not_in_it(seed):
+    assert_on_rock(seed)
+
+
+@pytest.mark.parametrize("seed", [45, 90, 103, 7984, 16176])
+def test_fingers_curl_under_boulders_behind_their_joints(seed):
+    assert_on_rock(seed)
+
+
+@pytest.mark.parametrize("seed", [89, 232, 48338])
+def test_fingers_reach_over_boulders_that_fall_off_steeply(seed):
+    assert_on_rock(seed)
 
 
 # Mending ------------------------------------------------------------------------------------------

@@ -155,6 +155,19 @@ def test_a_fine_mesh_of_a_shape_is_held_as_the_shape(cases) -> None:
         np.testing.assert_allclose(reach / size, want / size, atol=0.03, err_msg=str(hold))
 
 
+def test_the_envelope_of_a_fine_mesh_is_that_of_the_shape_where_it_falls_off_steeply() -> None:
+    hold, rotation, axes, place = MESHED[9]
+    there, mesh = Pose(np.array(place), axes).inverse(), mesh_of(hold)
+    for frame in HAND.frames(rotation):
+        want, found = (frame.rock(each, there) for each in (hold, mesh))
+        for section, other in zip(want.sections, found.sections, strict=True):
+            (points,) = (np.asarray(piece) @ [1.0, 1.0j] for piece in other.pieces)
+            # as far down as a finger reaches, where it is steeper than 3 in 1
+            near = points[(points.real > -0.02) & (np.abs(points) < SIZE.reach)]
+            assert np.abs(np.diff(near.imag) / np.diff(near.real)).max() > 3.0
+            np.testing.assert_allclose(section.clearances(near), 0.0, atol=1e-4)
+
+
 def reaches(hand: SettledHand) -> np.ndarray:
     return np.array([wrench_space(hand).support(way) for way in WAYS])
 
