@@ -161,12 +161,15 @@ class CombinationSearch:
             for start in {as_it_is, seen[-1], *self.anywhere()}:
                 deadline.check(SETTINGS.late)
                 choices.add(self._climbed(start, smallest))
-            new = [(worth, choice) for worth, choice in choices if choice not in seen]
+            enough = 0.97  # of what is needed: with less no plan is made
+            new = [
+                (worth, choice)
+                for worth, choice in choices
+                if choice not in seen and self.part(choice) >= enough
+            ]
             if not new:
                 return None
             _, choice = max(new)
-            if self.part(choice) < 0.97:  # of what is needed: with less no plan is made
-                return None
             seen.append(choice)
             change = self.change(choice)
             trial = None if change is None else self.trials.one(change)

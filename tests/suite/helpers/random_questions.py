@@ -44,6 +44,13 @@ FEW = {
 }
 """Of them some that stand for all, where all would take long."""
 
+BEYOND_HELP = (23, 44, 46, 91, 102, 109, 124, 126)
+"""Of the first thirty plain ones of three or four hands that are overloaded, those that no advice
+helps, as no combination of all that is tried holds."""
+
+OUT_OF_PLANS = (85, 119)
+"""Of the same, those for which all plans of advice are made before its search has ended."""
+
 few_and_all = pytest.mark.parametrize(
     "seeds", [FEW, pytest.param(SEEDS, marks=pytest.mark.slow)], ids=["few", "all"]
 )
