@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from hand_models.sections.section import Complexes, Flags, Section
 from hand_models.sections.settings import SECTION_SETTINGS
 
 __all__ = ["Outlines"]
-
-_NO_LENGTH: Final = 1e-12
-"""Length of what is no rock [m]."""
 
 
 class Outlines(NamedTuple):
@@ -74,7 +71,8 @@ class Outlines(NamedTuple):
         blocks = math.ceil(max([1, *(len(a[0]) + len(b[0]) for a, b in taken)]) / block)
         # what stands for no rock is 1 km away, and next to nothing long
         points = np.full((len(taken), blocks * block), complex(1e3))
-        lengths, bare = np.full(points.shape, _NO_LENGTH), np.zeros(points.shape, dtype=bool)
+        lengths = np.full(points.shape, SECTION_SETTINGS.no_length)
+        bare = np.zeros(points.shape, dtype=bool)
         for i, (under, beside) in enumerate(taken):
             for values, own, more in zip((points, lengths), under, beside, strict=True):
                 values[i, : len(own) + len(more)] = np.concatenate([own, more])
@@ -107,7 +105,7 @@ def _standing_out(rock: FingerRock, reach: float, spacing: float) -> tuple[Compl
     places, lengths = _points(rock.frame, reach, spacing)
     if rock.tile is not None and len(places):
         out = rock.tile.clearances(places) / SECTION_SETTINGS.standing_out
-        lengths = np.maximum(lengths * np.clip(out, 0.0, 1.0), _NO_LENGTH)
+        lengths = np.maximum(lengths * np.clip(out, 0.0, 1.0), SECTION_SETTINGS.no_length)
     return places, lengths
 
 

@@ -34,6 +34,8 @@ class SectionSettings:
     standing_out: float = 1e-4
     """Height by which rock beside the tiles stands out of the rock under them from which on it
     counts with its whole length [m]: a tile's bed is pressed in by 0.07 to 0.2 mm."""
+    no_length: float = 1e-12
+    """Length of what is no rock, or is there already [m]: next to nothing, but divides."""
     most_circles: int = 10
     """Largest number of circles fitted to an ellipse in turn; two or three are mostly enough."""
     last_turn: float = 1e-8
