@@ -16,7 +16,7 @@ from hand_models.base import Array
 from hand_models.hand import FINGERS
 from planner import programs
 from planner.prepare import PreparedStance
-from planner.programs import CAP_SLACK, LOAD_BOX, LOAD_UNIT, Outcome
+from planner.programs import CAP_SLACK, LOAD_UNIT, Outcome
 from planner.result import LoadRecovery, SentPlan
 from planner.verification import Check
 
@@ -56,8 +56,9 @@ def sent_plans(
     Returns
     -------
     kept, feedback : SentPlan
-        Verified; a balance that does not pass the checks, or has loads beyond `LOAD_BOX`, counts
-        as none. Feedback changes nothing where the tensions can be kept.
+        Verified; a balance that does not pass the checks, or has loads beyond
+        `programs.load_box`, counts as none. Feedback changes nothing where the tensions can be
+        kept.
     """
     data, held = there.hands.data, []
     for space, own in zip(there.hands.spaces, tensions, strict=True):
@@ -78,7 +79,8 @@ def _verified(there: PreparedStance, outcome: Outcome, idle: float) -> SentPlan:
     """Return what the loads of a program say if they pass the checks of any plan."""
     if not outcome.solved:
         return SentPlan()
-    if max(np.abs(loads).max(initial=0.0) for loads in outcome.loads) > LOAD_BOX * LOAD_UNIT:
+    box = programs.load_box(there.hands.wrench) * LOAD_UNIT
+    if max(np.abs(loads).max(initial=0.0) for loads in outcome.loads) > box:
         return SentPlan()
     recovery = LoadRecovery(there.batch, there.hands.spaces, there.hands.scaled)
     arrays, _, effort = recovery.read(outcome.loads)

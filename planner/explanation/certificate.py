@@ -111,7 +111,7 @@ def certify(
     if irreducible is not None:
         size = LOAD_UNIT * blocks_up_to(system, irreducible)
         # [N] what is proven beyond is the reciprocal of a residual that is rounding alone
-        up_to = min(size, 1e9) if math.isfinite(size) else None
+        up_to = min(size, max(1e9, LOAD_UNIT * system.box)) if math.isfinite(size) else None
         irreducible = _in_order(irreducible, limits, spaces)
     return Certificate(
         utilisation=cap,
@@ -162,6 +162,7 @@ def _system(
             for row in space.rows[0 if capped else len(space.s) :]
         ),
         given=tuple(LimitName(owners[row], None, None, HELD_WRENCH) for row in range(len(owners))),
+        box=programs.load_box(data.wrench),
     )
 
 

@@ -7,7 +7,7 @@ constraint. With the loads z, some constraints are infeasible if the linear prog
     min t  with  |W − Σ g − G z| ≤ t,  H z − h ≤ t,  |z| ≤ X
 
 has t > 0; its multipliers d (balance) and λ (hard rows) are the certificate. W is the body wrench,
-Σ g the wrench at zero loads. The box X of `LOAD_BOX`, far above any strength, always applies.
+Σ g the wrench at zero loads. The box X of `load_box`, far above any strength, always applies.
 
 The dual linear program has as many equations as there are loads, whatever the number of rows. Its
 solver is kept from one question to the next. With r = W − Σ g, infeasibility is proven where
@@ -77,7 +77,7 @@ class FarkasProgram:
 
     Columns are d⁺ and d⁻ (nb each; d is a start plus d⁺ − d⁻), λ (n), and the positive and negative
     parts of Gᵀd − Hᵀλ (M each). Rows define these parts (M); the last row sums d⁺, d⁻, λ. X is
-    `LOAD_BOX`, the largest size of a load.
+    the largest size of a load.
 
     Parameters
     ----------
@@ -87,10 +87,12 @@ class FarkasProgram:
         Right-hand side r of the balance G z = r.
     H, h : ndarray, shapes (n, M), (n,)
         Hard rows H z ≤ h.
+    box : float, optional
+        Largest size X of a load.
     """
 
-    def __init__(self, G: Array, goal: Array, H: Array, h: Array) -> None:
-        self.G, self.goal, self.h = G, goal, h
+    def __init__(self, G: Array, goal: Array, H: Array, h: Array, box: float = LOAD_BOX) -> None:
+        self.G, self.goal, self.h, self.box = G, goal, h, box
         leak = np.eye(G.shape[1])
         parts = np.hstack([G.T, -G.T, -H.T, -leak, leak])
         counts = np.arange(parts.shape[1]) < parts.shape[1] - 2 * len(leak)
@@ -152,7 +154,7 @@ class FarkasProgram:
 
     def _priced(self, more: Array, less: Array) -> Array:
         """Return the columns' costs; what d⁺ and d⁻ gain is given."""
-        box = np.full(2 * self.G.shape[1], LOAD_BOX)
+        box = np.full(2 * self.G.shape[1], self.box)
         return np.concatenate([-more, -less, self.h, box])
 
     def _solved(self, costs: Array, most: Array, start: Array, total: float) -> Multipliers | None:
@@ -223,6 +225,8 @@ class HardRowSystem:
         Constraint that each hard row belongs to.
     given : sequence of LimitName, length nb − 6
         Constraint that each balance row after the sixth belongs to.
+    box : float, optional
+        Largest size X of a load.
 
     Attributes
     ----------
@@ -245,15 +249,16 @@ class HardRowSystem:
         h: Array,
         names: Sequence[LimitName],
         given: Sequence[LimitName],
+        box: float = LOAD_BOX,
     ) -> None:
-        self.G, self.g, self.wrench, self.H, self.h = G, g, wrench, H, h
+        self.G, self.g, self.wrench, self.H, self.h, self.box = G, g, wrench, H, h, box
         self.goal = np.asarray(wrench - g)
         self.names, self.given = names, given
         whose = (*names, *given)
         self.constraints = tuple(dict.fromkeys(whose))
         self._places = {name: i for i, name in enumerate(self.constraints)}
         self.owners = np.array([self._places[name] for name in whose], dtype=np.intp)
-        self.program = FarkasProgram(G, self.goal, H, h)
+        self.program = FarkasProgram(G, self.goal, H, h, box)
 
     def rows_of(
         self, constraints: Iterable[LimitName], *, balance: bool = True
@@ -282,7 +287,7 @@ class HardRowSystem:
     def bound(self, direction: Array, multipliers: Array) -> float:
         """Return an upper bound on d · (G z + g) over all loads that keep the hard rows.
 
-        Loads z are in the box |z| ≤ X of `LOAD_BOX`. With H z ≤ h and λ ≥ 0
+        Loads z are in the box |z| ≤ X. With H z ≤ h and λ ≥ 0
 
             d · (G z + g) = d · g + (Gᵀd − Hᵀλ) · z + λ · H z ≤ d · g + |Gᵀd − Hᵀλ| · X + λ · h.
 
@@ -291,7 +296,7 @@ class HardRowSystem:
         direction, multipliers : ndarray, shapes (nb,), (n,)
             Multipliers d of the balance rows, and λ ≥ 0 of the hard rows.
         """
-        leak = np.abs(self.G.T @ direction - self.H.T @ multipliers).sum() * LOAD_BOX
+        leak = np.abs(self.G.T @ direction - self.H.T @ multipliers).sum() * self.box
         return float(direction @ self.g + multipliers @ self.h + leak)
 
     def proves(self, direction: Array, multipliers: Array) -> bool:

@@ -19,7 +19,6 @@ import scipy
 from hand_models.base import Array, Indices
 from planner.explanation.active_limits import TOLERANCES
 from planner.explanation.infeasibility import BODY_ROWS, Chosen, HardRowSystem, Multipliers, ranked
-from planner.programs import LOAD_BOX
 from planner.result import LimitName
 
 __all__ = ["balance_alone", "blocks_up_to", "irreducible_set", "sufficient_alone"]
@@ -96,13 +95,13 @@ def blocks_up_to(system: HardRowSystem, names: Collection[LimitName]) -> float:
     Returns
     -------
     float
-        Nondimensional; at least `LOAD_BOX`, infinite if the proof needs no box.
+        Nondimensional; at least the system's box, infinite if the proof needs no box.
     """
     proof = system.least_violation(names)
     if proof is None:
-        return LOAD_BOX
+        return system.box
     tied, rows = system.rows_of(names)
-    return max(system.proven_up_to(proof.direction * tied, proof.multipliers * rows), LOAD_BOX)
+    return max(system.proven_up_to(proof.direction * tied, proof.multipliers * rows), system.box)
 
 
 def sufficient_alone(
@@ -183,6 +182,7 @@ class _Rows(NamedTuple):
     M: Array
     right: Array
     whose: Indices
+    box: float
 
     @classmethod
     def of(cls, system: HardRowSystem, kept: Collection[LimitName], rows: Chosen) -> _Rows:
@@ -195,6 +195,7 @@ class _Rows(NamedTuple):
             np.vstack([G, -G[BODY_ROWS:], system.H[rows]]),
             np.concatenate([goal, -goal[BODY_ROWS:], system.h[rows]]),
             np.concatenate([np.full(BODY_ROWS, -1), held, held, limits[rows]]),
+            system.box,
         )
 
     def hold(self, loads: Array, but: int) -> bool:
@@ -202,7 +203,7 @@ class _Rows(NamedTuple):
         over = self.M @ loads - self.right
         over[:BODY_ROWS] = np.abs(over[:BODY_ROWS])
         over[self.whose == but] = 0.0
-        small = np.abs(loads).max(initial=0.0) <= LOAD_BOX
+        small = np.abs(loads).max(initial=0.0) <= self.box
         return bool(small and over.max() <= TOLERANCES.kept)
 
     def loads_without(self, places: Iterable[int]) -> Iterator[tuple[int, Array]]:

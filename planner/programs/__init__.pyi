@@ -22,8 +22,8 @@ from .dual_bounds import (
     unproven_sentences as unproven_sentences,
 )
 from .hazard import Hazard as Hazard, TilePowers as TilePowers
+from .load_bounds import LOAD_BOX as LOAD_BOX, load_box as load_box
 from .program import (
-    LOAD_BOX as LOAD_BOX,
     TIE_WEIGHT as TIE_WEIGHT,
     Elastic as Elastic,
     tie_weight as tie_weight,

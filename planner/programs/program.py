@@ -23,7 +23,7 @@ price (an exact ℓ₁ penalty). Each program has a function in `planner.program
 `effort`        min Σ ‖E z + e₀‖²                  relative tensions and torques, under a cap
 `reach`         max c·t with W + B t for W         farthest body wrench, under a cap
 `load_factor`   max s with s W in place of W       at utilisation 1
-`nearest`       min ‖S (W − Σ …)‖                  hard rows alone, loads up to `LOAD_BOX`
+`nearest`       min ‖S (W − Σ …)‖                  hard rows alone, loads up to `load_box`
 `elastic`       min u + ρ (‖W − Σ …‖₁ + 1ᵀv)       hard rows exceeded by v
 ==============  =============================================================================
 
@@ -43,6 +43,7 @@ from numpy.typing import NDArray
 from hand_models.base import Array
 from hand_models.hand import FINGERS
 from planner.programs.conic import Columns, ConicProgram, Outcome, Reached
+from planner.programs.load_bounds import load_box
 from planner.programs.stance_data import StanceData
 from planner.programs.stance_program import (
     REFINED_SETTINGS,
@@ -51,10 +52,7 @@ from planner.programs.stance_program import (
     StanceProgram,
 )
 
-__all__ = ["LOAD_BOX", "TIE_WEIGHT", "Best", "Elastic", "Nearest", "Reach", "tie_weight"]
-
-LOAD_BOX: Final = 1e4
-"""Bound on every load, in `LOAD_UNIT`, where no limit counts: far beyond any strength."""
+__all__ = ["TIE_WEIGHT", "Best", "Elastic", "Nearest", "Reach", "tie_weight"]
 
 TIE_WEIGHT: Final = 8e-6
 """Weight of the mean square of relative tensions, beside the utilisation, in `unique`."""
@@ -261,7 +259,7 @@ class Reach(StanceProgram):
 
 
 class Nearest(StanceProgram):
-    """Program min ‖W − w‖ over the body wrenches w that hands can give with loads up to `LOAD_BOX`.
+    """Program min ‖W − w‖ over the body wrenches w that hands can give with loads up to `load_box`.
 
     Only hard rows count, no limits. ``value`` of the solved outcome is the distance, in
     `WRENCH_UNIT`.
@@ -277,7 +275,7 @@ class Nearest(StanceProgram):
 
     def __init__(self, data: StanceData, kept: int = 0) -> None:
         super().__init__(data)
-        self.kept = kept
+        self.kept, self.box = kept, load_box(data.wrench)
         self.L, self.l0 = self.L[:0], self.l0[:0]
 
     def define(self) -> Definition:
@@ -287,7 +285,7 @@ class Nearest(StanceProgram):
         missing, z = cp.Variable(len(self.G)), self.loads()
         balance = self.G @ z + missing == self.data.offset
         _, limits, hard = self.rows(z, 0.0)
-        box = [z <= LOAD_BOX, -z <= LOAD_BOX]
+        box = [z <= self.box, -z <= self.box]
         kept = [missing[len(self.G) - self.kept :] == 0.0] if self.kept else []
         problem = cp.Problem(cp.Minimize(cp.norm(missing)), [balance, *kept, hard, *box])
         return Definition(problem, (z,), (balance, limits, hard))
@@ -304,7 +302,7 @@ class Nearest(StanceProgram):
         A[box:cone, 1 + count :] = np.vstack([np.eye(size), -np.eye(size)])
         A[cone:, : 1 + count] = -np.eye(1 + count)
         b = np.zeros(len(A))
-        b[:count], b[zero:box], b[box:cone] = self.data.offset, self.h, LOAD_BOX
+        b[:count], b[zero:box], b[box:cone] = self.data.offset, self.h, self.box
         P, q = np.zeros((2, A.shape[1]))
         q[0] = 1.0
         return ConicProgram(P, q, (Columns.of(A),), b, zero, second_order=1 + count)

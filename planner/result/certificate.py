@@ -40,7 +40,8 @@ class CertificateOf(Struct, Generic[AnyVector, SetOfWrenches], frozen=True, kw_o
         c in the hand frame H [1/N, 1/(N·m)] of each hand with a prescribed wrench, by limb; zero
         for free components.
     supremum : float
-        Largest value over all loads up to 10⁶ N within hard rows and, within a cap, limits.
+        Largest value over all loads within hard rows and, within a cap, limits. Loads are at most
+        10⁶ N, or a hundred times the force that the body needs if that is more.
     needed : float
         Value that the question needs; larger than ``supremum``.
     shortfall : vector, length 6, or None
@@ -57,12 +58,13 @@ class CertificateOf(Struct, Generic[AnyVector, SetOfWrenches], frozen=True, kw_o
         Irreducible infeasible subset: limits, hard rows (all rows of a name together) and
         prescribed hand wrenches (``held_wrench``) that alone leave no balance, each of them needed
         for that. Other rows may be in the way, too. In the order of ``blocking``. Empty if even
-        loads of any sign, up to 10⁶ N, do not balance the body. None if rounding or a deadline left
-        the subset undecided.
+        such loads of any sign do not balance the body. None if rounding or a deadline left the
+        subset undecided.
     irreducible_up_to : float or None
-        Largest loads for which the subset is proven to leave no balance [N]; at least 10⁶, far
-        beyond any strength, but nearly parallel rows may meet beyond. 10⁹ if it is proven up to
-        there or farther. None if no loads of any size balance the body, or there is no subset.
+        Largest loads for which the subset is proven to leave no balance [N]; at least those of
+        ``supremum``, far beyond any strength, but nearly parallel rows may meet beyond. 10⁹ if it
+        is proven up to there or farther. None if no loads of any size balance the body, or there
+        is no subset.
     sufficient : sequence of LimitName or None
         Members of the subset whose removal alone makes the question feasible: within the cap, or at
         any utilisation. Empty if no single removal does. None if undecided, or if the subset has

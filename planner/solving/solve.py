@@ -16,7 +16,7 @@ from planner.deadline import Budget, late_sentence
 from planner.explanation import LimitUse, certify
 from planner.floating import SETTINGS
 from planner.prepare import PreparedStance, checked_question, prepare_stance
-from planner.programs import CAP_SLACK, LOAD_BOX, LOAD_UNIT
+from planner.programs import CAP_SLACK, LOAD_UNIT
 from planner.question import Question
 from planner.result import LoadFactor, Plan, Time
 from planner.solving.explained import explained_plan, reason_beyond, unexplained
@@ -155,9 +155,7 @@ def answer_on(
     if answer is None:
         found = _solutions(prepared, budget, near, twice=prove)
         answer = _first_verified(prepared, checks, found)
-    if isinstance(answer, Failed) or _beyond_all_loads(prepared, answer):
-        proven = prove or not isinstance(answer, Failed)
-        answer = _second_look(prepared, checks, answer, budget, prove=proven)
+    answer = _second_look(prepared, checks, answer, budget, prove=prove)
     if isinstance(answer, Failed):
         deadline.check("a plan was found or proven infeasible")
     return StanceAnswer(prepared, checks, answer, budget, (start, modelled))
@@ -212,25 +210,27 @@ def _next_verified(
 
 
 def _beyond_all_loads(prepared: PreparedStance, found: Answer) -> bool:
-    """Return whether loads of a plan of fixed wrists exceed `LOAD_BOX`, and the need by far.
+    """Return whether loads of a plan of fixed wrists exceed `programs.load_box`.
 
     With such loads the body is balanced where the hard rows nearly contradict the balance.
     """
     if prepared.hands.floating or found.utilisation <= 1.0:
         return False
     most = max(np.abs(loads).max(initial=0.0) for loads in found.solution.least.loads)
-    needed = float(np.linalg.norm(prepared.wrench[:3]))
-    # with a thousand times the need, hands do little but squeeze each other
-    return bool(most > max(LOAD_BOX * LOAD_UNIT, 1e3 * needed))
+    return bool(most > programs.load_box(prepared.hands.wrench) * LOAD_UNIT)
 
 
 def _second_look(
     prepared: PreparedStance, checks: Checks, found: Answer, budget: Budget, *, prove: bool
 ) -> Answer:
-    """Return the proof that there is no balance, if that is wanted, or a plan at its border.
+    """Return the proof that there is no balance, or a plan at its border; else what was found.
 
-    ``found``: what does not pass its checks, or has loads without bounds.
+    Of what does not pass its checks, if a proof is wanted; and of loads beyond `load_box`.
     """
+    if not isinstance(found, Failed):
+        if not _beyond_all_loads(prepared, found):
+            return found
+        prove = True
     solution = found.solution
     if prove and solution.least.balance_dual is None:
         deadline.check("a plan was found")
@@ -280,8 +280,7 @@ def try_stance(
     budget = Budget(SETTINGS.programs)
     checks = Checks.of(prepared, idle)
     answer = _first_verified(prepared, checks, _solutions(prepared, budget, near))
-    if isinstance(answer, Failed):
-        answer = _second_look(prepared, checks, answer, budget, prove=False)
+    answer = _second_look(prepared, checks, answer, budget, prove=False)
     overloaded = checks.overloaded
 
     def factor() -> LoadFactor:

@@ -147,7 +147,7 @@ def test_tensions_of_feedback_go_with_loads_that_hands_can_bear(mine: Question):
 def test_loads_beyond_the_box_balance_nothing(monkeypatch):
     prepared, own = prepare_stance(ASKED), tensions_of(ASKED)
     assert sent_plans(prepared, own, 0.0)[0].utilisation is not None
-    monkeypatch.setattr("planner.execution.set_points.LOAD_BOX", 1.0)
+    monkeypatch.setattr("planner.programs.load_box", lambda wrench: 1.0)
     assert [each.utilisation for each in sent_plans(prepared, own, 0.0)] == [None, None]
 
 

@@ -1,6 +1,7 @@
 """Certificates of infeasibility, against HiGHS."""
 
 import math
+import time
 from dataclasses import replace
 from functools import cache
 
@@ -10,8 +11,9 @@ from scipy.optimize import linprog
 
 from hand_models.base import Pose
 from hand_models.rock import Edge, Plane
+from planner.prepare import prepare_stance
 from planner.programs import WRENCH_UNIT
-from planner.solving import plan
+from planner.solving import KnownStance, answer_on, plan, try_stance
 from tests.suite.helpers import peer
 from tests.suite.helpers.stances import ask, on_wall, random_answer, random_question
 
@@ -161,3 +163,30 @@ def test_loads_beyond_all_strength_are_none():
         assert answer.certificate.utilisation is None
         assert answer.certificate.supremum < answer.certificate.needed
         assert answer.certificate.irreducible
+
+
+def test_a_balance_beyond_all_strength_is_none_whichever_way_it_is_asked_for():
+    """HiGHS balances the body, but not with loads that count; nor does any plan."""
+    asked = replace(random_question(175), want=frozenset())
+    assert np.abs(peer.least_utilisation(asked).x[:-1]).max() > peer.largest_load(asked)
+    bounded = peer.least_utilisation(asked, largest=peer.largest_load(asked))
+    assert bounded.status == peer.INFEASIBLE
+    assert plan(asked).status == "infeasible"
+    assert plan(replace(asked, explain=False)).status == "infeasible"
+    assert KnownStance(asked).plan(asked.needed_wrench()).status == "infeasible"
+    prepared = prepare_stance(asked)
+    for prove in (True, False):
+        found = answer_on(prepared, time.perf_counter(), prove=prove)
+        assert found.answer.utilisation == math.inf
+    assert try_stance(prepared).utilisation == math.inf
+
+
+@pytest.mark.parametrize("seed", [27, 29])
+def test_what_is_beyond_all_strength_grows_with_what_the_body_needs(seed):
+    """That a body is heavy is no proof: without a verified plan the answer is `failed`."""
+    asked = random_question(seed)
+    for times in (1.0, 1e4, 1e8):
+        more = replace(asked, body_wrench=times * asked.needed_wrench())
+        other = peer.least_utilisation(more)
+        assert np.abs(other.x[:-1]).max() < peer.largest_load(more)
+        assert plan(more).status != "infeasible"

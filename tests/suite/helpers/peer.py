@@ -116,9 +116,18 @@ def margin_program(question: Question, sets: list[WrenchSpace] | None = None) ->
     )
 
 
-def least_utilisation(question: Question, sets: list[WrenchSpace] | None = None) -> OptimizeResult:
-    """min u; ``fun`` is the utilisation, ``x`` the loads y of all hands, then u."""
-    return solve(*margin_program(question, sets))
+def largest_load(question: Question) -> float:
+    """Return the largest load that counts [N]: 10⁶ N, or a hundred times the body's force."""
+    return max(1e6, 1e2 * float(np.linalg.norm(question.needed_wrench()[:3])))
+
+
+def least_utilisation(
+    question: Question, sets: list[WrenchSpace] | None = None, largest: float = np.inf
+) -> OptimizeResult:
+    """min u, loads up to a largest; ``fun`` is u, ``x`` the loads y of all hands, then u."""
+    program = margin_program(question, sets)
+    bounds = [(-largest, largest)] * (len(program[0]) - 1) + [(None, None)]
+    return solve(*program, bounds=bounds)
 
 
 def largest_load_factor(question: Question) -> float | None:
