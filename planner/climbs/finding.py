@@ -6,7 +6,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +16,9 @@ from planner.climbs.found_climb import FoundClimb
 from planner.climbs.move_checks import MoveChecks
 from planner.climbs.other_bodies import detours
 from planner.climbs.outcome import ClimbStatus, DecidingStage, Raise, RefusedMoves
+from planner.climbs.postures import Postures
 from planner.climbs.raising import raises
-from planner.climbs.routing import Arc, ClimbStep, RouteMaker
+from planner.climbs.routing import ClimbStep, RouteMaker
 from planner.deadline import DeadlineError
 from planner.question import Limits, Objective
 from planner.route import (
@@ -31,7 +31,7 @@ from planner.route import (
     evaluate,
     plan_climb,
 )
-from planner.search import Ends, Found, State, Wall, search
+from planner.search import Arc, Ends, Found, SearchMemory, State, Wall, search
 
 __all__ = ["ClimbProgress", "find_climb"]
 
@@ -121,7 +121,6 @@ def find_climb(
 class _Planned(NamedTuple):
     """A climb that has a plan from end to end."""
 
-    found: Found
     steps: list[ClimbStep]
     climb: Climb
     result: RouteResult
@@ -129,6 +128,18 @@ class _Planned(NamedTuple):
     @property
     def least(self) -> float:
         return self.result.load_factor or -np.inf
+
+
+class _Tried(NamedTuple):
+    """Moves that were planned, and the parts that have no plan."""
+
+    climb: Climb | None
+    failures: tuple[Failure, ...]
+
+    @property
+    def failure(self) -> Failure | None:
+        """The first part that has none."""
+        return self.failures[0] if self.failures else None
 
 
 class _Finder:
@@ -141,7 +152,8 @@ class _Finder:
         progress: Callable[[ClimbProgress], None] | None,
     ) -> None:
         self._maker, self._settings, self._progress = maker, settings, progress
-        self._blocked = set[Arc]()
+        self._asks = False
+        self._memory = SearchMemory()
         self._refused = Counter[tuple[str | None, KnotPhase]]()
         self._reasons = dict[tuple[str | None, KnotPhase], str]()
         self._best: _Planned | None = None
@@ -149,34 +161,19 @@ class _Finder:
         # below one, the hands do not hold the robot at all
         self._floor = 1.0
         self._begun = time.perf_counter()
-        self._seconds = dict.fromkeys(("search", "moves", "stages", "changes"), 0.0)
+        self._seconds = dict.fromkeys(("search", "postures", "moves", "stages", "changes"), 0.0)
         self._before: Climb | None = None
+        self._began: object = None
         self._checks = MoveChecks(maker.wall, maker.limits)
+        self._postures = Postures(self._checks)
 
     def find(self, start: Ends, goal: Ends, within: float, at_least: float | None) -> FoundClimb:
         """Search and plan until the climb is good enough, nothing is left, or the time is over."""
-        found, share, ended = None, 0.7, False
-        while not ended:
-            bounded = np.isfinite(self._bound)
-            found = self._search(start, goal, within, at_least, share)
-            if not found.states:
-                break
-            # the first search bounds all climbs; those after it ask which moves pass
-            pairs = [*pairwise(found.states), *zip(found.states, found.states, strict=True)]
-            if not bounded and not all(self._checks.passes(*pair) for pair in pairs):
-                continue
-            try:
-                planned = self._plan(found)
-            except DeadlineError:
-                break
-            if planned is not None:
-                if self._best is None or planned.least > self._best.least:
-                    self._best = planned
-                # a search that was broken off may find a better one in all of the time left
-                ended = self._good(within, at_least) or found.finished or share == 1.0
-                share = 1.0
-            ended = ended or deadline.expired()
-        assert found is not None
+        # the first search bounds all climbs; in the next one moves are planned as climbs are found
+        found = self._search(start, goal, within, at_least, 0.3)
+        if found.states and not deadline.expired():
+            self._asks = True
+            found = self._search(start, goal, within, at_least, 1.0)
         return self._answer(found, within, at_least)
 
     def _search(
@@ -192,8 +189,9 @@ class _Finder:
                 at_least=at_least,
                 floor=self._floor,
                 seconds=None if left is None else share * left,
-                blocked=frozenset(self._blocked),
-                passes=self._checks.passes if np.isfinite(self._bound) else None,
+                passes=self._checks.passes if self._asks else None,
+                refuses=self._refuses if self._asks else None,
+                memory=self._memory,
                 progress=lambda _, __, bound, ___: self._report("search", bound),
             )
         except DeadlineError:
@@ -202,61 +200,75 @@ class _Finder:
         self._seconds["search"] += time.perf_counter() - begun
         return found
 
-    def _plan(self, found: Found) -> _Planned | None:
-        """Plan the moves of states; without a plan of them all, leave out those that have none."""
-        begun, states = time.perf_counter(), list(found.states)
-        climb = self._climb(states, self._before)
-        if climb.failure is not None and self._before is not None:
-            # joints that were chosen for other moves may be what is in the way
-            climb = self._climb(states, None)
-        while climb.failure is not None:
-            failure, step = climb.failure, ClimbStep.each(states)[max(climb.failure.move, 1) - 1]
-            for other in detours(self._maker.wall, self._checks, states, step):
-                again = self._climb(other, climb)
+    def _refuses(self, states: Sequence[State]) -> set[Arc]:
+        """Plan the moves of states; return those that have no plan, and keep a climb that has."""
+        begun, blocked = time.perf_counter(), set[Arc]()
+        tried, failed, own = self._climb(states), False, ClimbStep.each(states)
+        first = tried
+        while tried.failure is not None:
+            failure, steps = tried.failure, ClimbStep.each(states)
+            step = steps[max(failure.move, 1) - 1]
+            alone = len(tried.failures) == 1
+            others = detours(self._maker.wall, self._checks, states, step) if alone else ()
+            for other in others:
+                again = self._climb(other)
                 if again.failure is None or again.failure.move > failure.move:
-                    climb, states = again, other
+                    tried, states = again, other
                     break
+                if again.climb is not None:
+                    # its postures fit, and another move has no plan: that counts as well
+                    blocked |= self._refusal(again, ClimbStep.each(other))
             else:
-                self._leave_out(failure, step)
+                blocked |= self._refusal(tried, steps)
+                if first is not tried:
+                    # the climb that was asked about has no plan either
+                    blocked |= self._refusal(first, own)
+                failed = True
                 break
-        self._before = climb
         self._seconds["moves"] += time.perf_counter() - begun
-        if climb.failure is not None:
-            return None
+        if failed or tried.climb is None:
+            return blocked
         begun = time.perf_counter()
         self._report("stages")
-        result = evaluate(climb.route, workers=1, climb=climb)
+        result = evaluate(tried.climb.route, workers=1, climb=tried.climb)
         self._seconds["stages"] += time.perf_counter() - begun
-        return _Planned(found, ClimbStep.each(states), climb, result)
+        planned = _Planned(ClimbStep.each(states), tried.climb, result)
+        if self._best is None or planned.least > self._best.least:
+            self._best = planned
+        return set()
 
-    def _climb(self, states: Sequence[State], after: Climb | None) -> Climb:
-        """Plan moves, after those of another climb or from some joint angles at the start."""
-        best: Climb | None = None
-        own = () if after is not None else self._checks.joints(states[0])
-        starts = chain([None], own)
-        for joints in starts:
-            climb = plan_climb(
-                self._maker.route(ClimbStep.each(states), joints),
-                self._settings,
-                lambda done, total: self._report("moves", done=done, total=total),
-                known=self._maker.branches,
-                after=after,
-            )
-            if best is None or len(climb.knots) > len(best.knots):
-                best = climb
-            failure = climb.failure
-            # the joints at the start last at least till the body has shifted
-            if failure is None or failure.move > 1 or failure.phase not in ("start", "shift"):
-                return climb
-        assert best is not None
-        return best
+    def _climb(self, states: Sequence[State]) -> _Tried:
+        """Choose postures for states, and plan the moves."""
+        begun = time.perf_counter()
+        steps = ClimbStep.each(states)
+        chosen = self._postures.choose(steps)
+        self._seconds["postures"] += time.perf_counter() - begun
+        if isinstance(chosen, list):
+            return _Tried(None, tuple(chosen))
+        start = steps[0].shifts[0], [angles.tobytes() for angles in chosen.start.values()]
+        after = self._before if start == self._began else None
+        climb = plan_climb(
+            self._maker.route(steps, chosen.start, chosen.placed),
+            self._settings,
+            lambda done, total: self._report("moves", done=done, total=total),
+            after=after,
+        )
+        self._before, self._began = climb, start
+        return _Tried(climb, () if climb.failure is None else (climb.failure,))
 
-    def _leave_out(self, failure: Failure, step: ClimbStep) -> None:
-        """Leave a move that fails out of further searches."""
-        self._blocked |= step.refused(failure.phase)
-        key = failure.limb, failure.phase
-        self._refused[key] += 1
-        self._reasons[key] = failure.reason
+    def _refusal(self, tried: _Tried, steps: Sequence[ClimbStep]) -> set[Arc]:
+        """Return what to leave out as moves fail, and count them."""
+        limbs, found = self._maker.wall.robot.limbs, set[Arc]()
+        for failure in tried.failures:
+            step = steps[max(failure.move, 1) - 1]
+            # of a planned climb it is not said which limb is in the way
+            if tried.climb is None and failure.phase == "shift" and failure.limb in limbs:
+                self._checks.learn_shift(step.shifts, limbs.index(failure.limb))
+            key = failure.limb, failure.phase
+            self._refused[key] += 1
+            self._reasons[key] = failure.reason
+            found |= step.refused(failure.phase)
+        return found
 
     def _good(self, within: float, at_least: float | None) -> bool:
         least = -np.inf if self._best is None else self._best.least
@@ -296,7 +308,7 @@ class _Finder:
         return FoundClimb(
             status=status,
             wall=wall,
-            found=best.found,
+            found=found,
             bound=self._bound,
             least=best.result.load_factor,
             route=_with_joints(best.climb),

@@ -7,23 +7,23 @@ the closed hand does to its rock.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import combinations, islice, product
+from itertools import combinations, pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.base import Array, CruxError, Pose, wrench_transport
-from planner.motion import CollisionScene, capsule_distances
+from planner.climbs.clearances import Clearances
+from planner.climbs.holds import HoldWays, Stay
+from planner.climbs.joint_loads import JointLoadPrograms, LimbLoads
 from planner.prepare import hand_space
 from planner.programs import WRENCH_UNIT
-from planner.question import Limits, Question, Stance
-from planner.robots import scene_number
+from planner.question import Limits, Stance
 from planner.route import closing_loads
 from planner.screening import StanceIndices, solve_stance
 from planner.search import State, Wall
-from planner.solving import plan
 
 __all__ = ["MoveChecks"]
 
@@ -39,58 +39,94 @@ class MoveChecks:
     """
 
     def __init__(self, wall: Wall, limits: Limits | None = None) -> None:
-        self._wall, self._limits = wall, limits or Limits()
+        self.wall, self._limits = wall, limits or Limits()
         self._least = 1.0 / self._limits.utilisation
         self._closed = dict[int, Array | None]()
         self._known = dict[tuple[State, int], bool]()
         self._fits = dict[State, bool]()
         self._meets = dict[tuple[int, int, int, int, int], NDArray[np.bool_]]()
-        self._scene = CollisionScene(wall.robot, ())
+        self._loads = dict[tuple[int, int, int], list[LimbLoads]]()
+        self._met = dict[int, set[tuple[tuple[int, int], tuple[int, int]]]]()
+        self._lost = dict[tuple[int, int], set[tuple[int, int]]]()
+        self.clearances = Clearances(wall)
+        self.programs = JointLoadPrograms(wall, self._limits)
+        self.ways = HoldWays(wall, self.clearances)
 
     def passes(self, before: State, after: State) -> bool:
         """Return whether one state may follow another: by a lift, a placement or a shift."""
         if before == after:
             if before not in self._fits:
-                self._fits[before] = next(self._clear(before), None) is not None
-            return self._fits[before]
-        if before.body != after.body or -1 not in (*before.members, *after.members):
+                clear = next(self._clear(before), None) is not None
+                # what four hands hold is seen to where one of them lifts
+                self._fits[before] = clear and (-1 not in before.members or self._borne(before))
+            return self._fits[before] and not self._meeting(before)
+        if before.body != after.body:
+            ends = min(before.body, after.body), max(before.body, after.body)
+            lost = self._lost.get(ends)
+            return lost is None or lost.isdisjoint(enumerate(after.members))
+        if -1 not in (*before.members, *after.members):
             return True
         whole, lift = (before, after) if -1 in after.members else (after, before)
-        key = whole, lift.members.index(-1)
+        limb = lift.members.index(-1)
+        hold = Stay(limb, whole.members[limb], (whole.body,))
+        way = hold._replace(lifts=True) if whole is before else hold._replace(placed=True)
+        key = whole, limb
         if key not in self._known:
             self._known[key] = self._holds(*key)
-        return self._known[key]
+        return self._known[key] and bool(self.ways.of(way))
 
-    def joints(self, state: State, most: int = 24) -> Iterator[dict[str, Array]]:
-        """Yield joint angles of the reach table with which a state has a plan [rad].
+    def _meeting(self, state: State) -> bool:
+        """Return whether limbs of a state are known to meet at its placements."""
+        pairs = self._met.get(state.body)
+        if pairs is None:
+            return False
+        own = set(enumerate(state.members))
+        return any(first in own and second in own for first, second in pairs)
 
-        Limbs keep clear of each other, and joints bear what the hands hold.
+    def learn_pair(self, body: int, first: tuple[int, int], second: tuple[int, int]) -> None:
+        """Leave states out in which two limbs, each with its placement, meet at a body."""
+        self._met.setdefault(body, set()).add((first, second))
+
+    def learn_shift(self, states: Sequence[State], limb: int) -> None:
+        """Leave out what keeps a limb from its hold in a shift of the body.
+
+        These are shifts from body to body in which it cannot keep its hold; if it can in each of
+        them, though not in all together, the last one.
         """
-        wall, robot = self._wall, self._wall.robot
-        hands = [
-            replace(wall.places[place], limb=robot.limbs[limb])
-            for limb, place in enumerate(state.members)
-            if place >= 0
-        ]
-        body = wall.bodies[state.body]
-        for chosen in islice(self._clear(state), most):
-            angles = dict[str, Array]()
-            for limb, k in chosen.items():
-                ways = wall.reach.branches(state.members[limb], state.body, limb)
-                name = robot.limbs[limb]
-                angles[name] = ways[k, : len(robot.chains[name].joints)]
-            stance = Stance(tuple(hands), body, robot=robot, joints=angles)
-            try:
-                found = plan(Question(stance, limits=self._limits, explain=False))
-            except CruxError:
-                return
-            if found.status == "optimal":
-                yield angles
+        place, ends = states[0].members[limb], list[tuple[int, int]]()
+        for before, after in pairwise(states):
+            pair = min(before.body, after.body), max(before.body, after.body)
+            if not self.ways.of(Stay(limb, place, pair)):
+                ends.append(pair)
+        for each in ends or [pair]:
+            self._lost.setdefault(each, set()).add((limb, place))
+
+    def _borne(self, state: State, more: Array | None = None) -> bool:
+        """Return whether limbs keep clear of each other at joint angles that bear the loads.
+
+        ``more``, shape (6,), is what hands supply besides, in `WRENCH_UNIT`.
+        """
+        own = {limb: place for limb, place in enumerate(state.members) if place >= 0}
+        loads = {limb: self._loads_of(limb, place, state.body) for limb, place in own.items()}
+        for chosen in self._clear(state):
+            picked = {limb: loads[limb][k] for limb, k in chosen.items()}
+            if self.programs.share(state, picked, more) <= 0.94:
+                return True
+        return False
+
+    def _loads_of(self, limb: int, place: int, body: int) -> list[LimbLoads]:
+        """Return the joint loads of a limb at each of the table's joint angles."""
+        key = limb, place, body
+        if key not in self._loads:
+            n = len(self.wall.robot.chains[self.wall.robot.limbs[limb]].joints)
+            ways = self.wall.reach.branches(place, body, limb)[:, :n]
+            self._loads[key] = [self.programs.loads(*key, angles) for angles in ways]
+        return self._loads[key]
 
     def _clear(self, state: State) -> Iterator[dict[int, int]]:
         """Yield joint angles at which limbs keep clear of each other: their number, by limb."""
         limbs = [limb for limb, place in enumerate(state.members) if place >= 0]
-        wall, body = self._wall, state.body
+        wall, body = self.wall, state.body
         counts = [len(wall.reach.branches(state.members[i], body, i)) for i in limbs]
         for chosen in product(*map(range, counts)):
             pairs = combinations(zip(limbs, chosen, strict=True), 2)
@@ -102,50 +138,42 @@ class MoveChecks:
         places = state.members[first], state.members[second]
         key = state.body, first, second, *places
         if key not in self._meets:
-            scene, limbs = self._scene, self._wall.robot.limbs
-            ways, segments = list[Array](), list[Array]()
-            for limb, place in zip((first, second), places, strict=True):
-                n = len(self._wall.robot.chains[limbs[limb]].joints)
-                ways.append(self._wall.reach.branches(place, state.body, limb)[:, :n])
-                segments.append(scene.limbs[limbs[limb]].segments(ways[-1]))
-            own = [scene.own[limbs[limb]] for limb in (first, second)]
-            mine = np.concatenate(own)
-            inside = [np.isin(scene.pairs, each) for each in own]
-            between = (inside[0] | inside[1]).all(axis=1) & inside[0].any(1) & inside[1].any(1)
-            pairs = np.argsort(mine)[np.searchsorted(np.sort(mine), scene.pairs[between])].reshape(
-                -1, 2
-            )
-            i, j = np.indices((len(ways[0]), len(ways[1]))).reshape(2, -1)
-            both = np.ascontiguousarray(np.hstack([segments[0][i], segments[1][j]]))
-            gaps = capsule_distances(both, scene.radii[mine], pairs, 0.02)
-            least = scene_number("motion", "margin_at_hold")
-            clear = gaps.min(axis=1, initial=np.inf) >= least
-            self._meets[key] = clear.reshape(len(ways[0]), len(ways[1]))
+            names, reach = self.wall.robot.limbs, self.wall.reach
+            ways = [
+                reach.branches(place, state.body, limb)[
+                    :, : len(self.wall.robot.chains[names[limb]].joints)
+                ]
+                for limb, place in zip((first, second), places, strict=True)
+            ]
+            self._meets[key] = self.clearances.apart((first, second), *ways)
         return self._meets[key]
 
     def _holds(self, whole: State, limb: int) -> bool:
         """Return whether the others hold the robot and what the closed hand of a limb does."""
-        members, screening = np.array(whole.members), self._wall.screening
-        own = self._closed_wrench(int(members[limb]))
+        members, screening = np.array(whole.members), self.wall.screening
+        own = self.closed_wrench(int(members[limb]))
         if own is None:
             return False
+        lift = whole._replace(
+            members=tuple(np.where(np.arange(len(members)) == limb, -1, members).tolist())
+        )
         needed = screening.needed(StanceIndices(np.array([whole.body]), members[None]))[0]
         found = solve_stance(screening.hands, np.delete(members, limb), needed - own).factor
         # a solver that fails proves nothing: the whole planner decides
-        return bool(np.isnan(found) or found >= self._least)
+        return bool(np.isnan(found) or found >= self._least) and self._borne(lift, -own)
 
-    def _closed_wrench(self, place: int) -> Array | None:
+    def closed_wrench(self, place: int) -> Array | None:
         """Return the rock's wrench on a closed hand without load, (6,); None if it cannot close."""
         if place not in self._closed:
-            hand = self._wall.places[place]
+            hand = self.wall.places[place]
             # the set of a hand does not depend on where the body is
-            stance = Stance((replace(hand, wrist="fixed"),), hand.pose, robot=self._wall.robot)
+            stance = Stance((replace(hand, wrist="fixed"),), hand.pose, robot=self.wall.robot)
             try:
                 settled, space = hand_space(stance, hand.limb)
             except CruxError:
                 self._closed[place] = None
             else:
-                off = hand.pose.position - self._wall.screening.hands.about
+                off = hand.pose.position - self.wall.screening.hands.about
                 about = wrench_transport(Pose(off, hand.pose.rotation))
                 wrench = space.wrench(closing_loads(settled, space))
                 self._closed[place] = -(about @ wrench) / WRENCH_UNIT

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise, zip_longest
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -11,12 +12,9 @@ import numpy as np
 from hand_models.base import Array, Pose
 from planner.question import HandOnHold, Limits, Objective, Stance
 from planner.route import KnotPhase, Move, Route
-from planner.search import State, Wall
+from planner.search import Arc, State, Wall
 
-__all__ = ["Arc", "ClimbStep", "RouteMaker"]
-
-Arc = tuple[State, State]
-"""Two states, one after the other; or those with all hands on the rock about a whole move."""
+__all__ = ["ClimbStep", "RouteMaker"]
 
 
 class ClimbStep(NamedTuple):
@@ -64,7 +62,9 @@ class ClimbStep(NamedTuple):
         if phase == "start":
             return frozenset({(self.shifts[0], self.shifts[0])})
         if phase == "shift" or self.lift is None or self.place is None:
-            return frozenset(zip(self.shifts, self.shifts[1:], strict=False))
+            # the body goes straight from the first to the last of them
+            ends = (self.shifts[0], self.shifts[-1])
+            return frozenset({*pairwise(self.shifts), ends})
         if phase in ("unload", "open"):
             return frozenset({(before, self.lift)})
         if phase in ("swing", "close"):
@@ -87,21 +87,35 @@ class RouteMaker:
 
     def __init__(self, wall: Wall, name: str, limits: Limits, objective: Objective) -> None:
         self.wall, self._name, self.limits, self._objective = wall, name, limits, objective
-        self._moves = dict[tuple[int, int, int | None], Move]()
+        self._moves = dict[tuple[int, int, int | None, bytes], Move]()
         self._places = {_key(each.pose): i for i, each in enumerate(wall.places)}
         self._bodies = {_key(each): i for i, each in enumerate(wall.bodies)}
 
-    def route(self, steps: Sequence[ClimbStep], joints: Mapping[str, Array] | None = None) -> Route:
-        """Return the route of moves, from the first state on, perhaps at joint angles [rad]."""
+    def route(
+        self,
+        steps: Sequence[ClimbStep],
+        joints: Mapping[str, Array] | None = None,
+        placed: Sequence[Array] = (),
+    ) -> Route:
+        """Return the route of moves, from the first state on.
+
+        Parameters
+        ----------
+        steps : sequence of ClimbStep
+        joints : mapping of str to ndarray, shape (n,), optional
+            Joint angles at the start [rad]; they are to be found by default.
+        placed : sequence of ndarray, shape (n,)
+            Joint angles of the limb of each move on its new placement [rad].
+        """
         wall, first = self.wall, steps[0].shifts[0]
         hands = [self._hand(limb, p) for limb, p in enumerate(first.members)]
-        last = steps[-1]
+        last, moves = steps[-1], [step for step in steps if step.lift is not None]
         return Route(
             name=self._name,
             start=Stance(
                 tuple(hands), wall.bodies[first.body], robot=wall.robot, joints=joints or "solve"
             ),
-            moves=tuple(self._move(step) for step in steps if step.lift is not None),
+            moves=tuple(self._move(step, angles) for step, angles in zip_longest(moves, placed)),
             end=None if last.lift is not None else wall.bodies[last.shifts[-1].body],
             limits=self.limits,
             objective=self._objective,
@@ -119,13 +133,21 @@ class RouteMaker:
     def _hand(self, limb: int, place: int) -> HandOnHold:
         return replace(self.wall.places[place], limb=self.wall.robot.limbs[limb])
 
-    def _move(self, step: ClimbStep) -> Move:
+    def _move(self, step: ClimbStep, angles: Array | None) -> Move:
         assert step.place is not None
-        body = step.place.body if len(step.shifts) > 1 else None
-        key = step.limb, step.place.members[step.limb], body
+        limb, body = self.wall.robot.limbs[step.limb], step.place.body
+        shifted = self.wall.bodies[body] if len(step.shifts) > 1 else None
+        place = step.place.members[step.limb]
+        key = (
+            step.limb,
+            place,
+            body if shifted else None,
+            b"" if angles is None else angles.tobytes(),
+        )
         if key not in self._moves:
-            hand = self._hand(step.limb, step.place.members[step.limb])
-            self._moves[key] = Move(hand, None if body is None else self.wall.bodies[body])
+            hand = self._hand(step.limb, place)
+            found = Move(hand, shifted)
+            self._moves[key] = found if angles is None else replace(found, joints={limb: angles})
         return self._moves[key]
 
 

@@ -19,7 +19,7 @@ from planner.search.lifts import Lifts
 from planner.search.programs import Programs
 from planner.search.settings import SEARCH_SETTINGS
 from planner.search.wall import State
-from planner.search.ways import Blocked, Passes, Way, Ways
+from planner.search.ways import Moves, Way, Ways
 
 __all__ = ["Decision"]
 
@@ -32,8 +32,7 @@ class Decision:
     lifts : Lifts
         All lifts that may have it.
     programs : Programs
-    moves : frozenset of pairs of State, and callable
-        Those that may not be made; and whether one may be.
+    moves : Moves
     attempts : float
         Parents of a lift that are tried over four hands.
     barred : set of Way, optional
@@ -44,7 +43,7 @@ class Decision:
         self,
         lifts: Lifts,
         programs: Programs,
-        moves: tuple[Blocked, Passes | None],
+        moves: Moves,
         attempts: float,
         barred: set[Way] | None = None,
     ) -> None:
@@ -97,24 +96,20 @@ class Decision:
     def _recall(self) -> None:
         """Take over what was solved before."""
         known, lifts = self._programs.known, self._lifts
-        count, bodies, limbs = lifts.ground.reached.shape
-        three = (known.members < 0).sum(axis=1) == 1
-        key = (known.members < 0).argmax(axis=1)
-        for limb in range(limbs - 1):
-            at = limb + (limb >= (known.members < 0).argmax(axis=1))
-            key = key * count + known.members[np.arange(len(key)), at]
-        own = np.flatnonzero(three & np.isin(key, lifts.keys))
-        triples = np.searchsorted(lifts.keys, key[own])
-        bounding = known.factors[own] < self._least
-        mine = own[bounding]
-        lifts.rule_out(triples[bounding], known.directions[mine], known.held[mine])
-        whole = lifts.keys[lifts.triples] * bodies + lifts.bodies
-        asked = key[own] * bodies + known.bodies[own]
-        at = np.minimum(np.searchsorted(whole, asked), max(len(whole) - 1, 0))
-        if len(whole):
-            fits = whole[at] == asked
-            self._factors[at[fits]] = known.factors[own[fits]]
-            self._nodes["out"][at[fits & bounding]] = 1
+        three = np.flatnonzero((known.members < 0).sum(axis=1) == 1)
+        triples, found = lifts.find(known.bodies[three], known.members[three])
+        bounding = known.factors[three] < self._least
+        low = bounding & (triples >= 0)
+        lifts.rule_out(triples[low], known.directions[three[low]], known.held[three[low]])
+        there = found >= 0
+        self._factors[found[there]] = known.factors[three[there]]
+        self._nodes["out"][found[there & bounding]] = 1
+        refused = self._ways.refused
+        if refused:
+            bodies, members = (np.array(column) for column in zip(*refused, strict=True))
+            _, found = lifts.find(bodies, members)
+            self._nodes["out"][found[found >= 0]] = 1
+            self._ways.hindered |= bool((found >= 0).any())
 
     def _claim(self, side: int, lifts: Indices, parent: int, via: int) -> None:
         self._nodes["claimed"][lifts] |= side
@@ -234,14 +229,74 @@ class Decision:
         """Try the climb over a lift that one end has passed, and one that the other has."""
         if j >= 0 and self._nodes["closed"][j] != 3 - side:
             return False
+        if i >= 0 and self._nodes["closed"][i] != side:
+            return False
         middle = Way(i, j, place) if side == 1 else Way(j, i, place)
         if middle in self._ways.barred or not self._ways.states(middle):
             return False
         first, last = (i, j) if side == 1 else (j, i)
         ways = [*reversed(list(self._chain(1, first))), middle, *self._chain(2, last)]
-        failed = self._try(ways)
-        self.stuck = failed is not None and failed is not middle
-        return failed is None or self.stuck
+        at = ways.index(middle)
+        while True:
+            unfit = [
+                (1 if k < at else 2, way.after if k < at else way.before)
+                for k, way in enumerate(ways)
+                if k != at
+            ]
+            unfit = [each for each in unfit if not self._fits(each[1])]
+            if unfit:
+                for part, lift in unfit:
+                    self._cut(part, lift)
+                return False
+            failed = self._try(ways)
+            if failed is None and self._ways.refuse(self.route):
+                self.route = ()
+                continue
+            if failed is None or failed is middle:
+                return failed is None
+            if failed not in self._ways.barred:
+                self.stuck = True
+                return True
+            k = ways.index(failed)
+            self._cut(*((1, failed.after) if k < at else (2, failed.before)))
+            return False
+
+    def _fits(self, lift: int) -> bool:
+        """Return whether a lift may be passed; if not, it is out of all further climbs."""
+        state = self._ways.state(lift)
+        if self._ways.passes(state, state):
+            return True
+        self._ways.refused.add(state)
+        self._ways.hindered = True
+        self._nodes["out"][lift] = 1
+        return False
+
+    def _cut(self, side: int, lift: int) -> None:
+        """Take back a lift that its parent does not lead to, and all that was reached over it.
+
+        What is next to lifts that are left is claimed again from there.
+        """
+        parents, vias = self._parents[side], self._vias[side]
+        own = np.flatnonzero(self._nodes["claimed"] & side)
+        cut = last = np.array([lift], dtype=np.intp)
+        while len(last):
+            last = own[np.isin(parents[own], last)]
+            cut = np.append(cut, last)
+        self._nodes["closed"][cut[self._nodes["closed"][cut] == side]] = 0
+        self._nodes["claimed"][cut] &= ~side
+        left = cut[self._nodes["out"][cut] == 0]
+        if not len(left):
+            return
+        _, met = self._lifts.expand(left, 0)
+        to = met[:, 1]
+        met = met[(to == -side) | ((to >= 0) & (self._nodes["closed"][to] == side))]
+        for other, parent, place in met.tolist():
+            if not self._nodes["claimed"][other] & side and not self._ways.fails(
+                self._way(side, parent, other, place)
+            ):
+                self._nodes["claimed"][other] |= side
+                parents[other], vias[other] = parent, place
+        self._push(side, left[(self._nodes["claimed"][left] & side) > 0])
 
     def _chain(self, side: int, lift: int) -> Iterator[Way]:
         """Return the ways from a lift back to its end; none from the end itself."""
@@ -254,13 +309,15 @@ class Decision:
         """Return the first way that fails; None, and the climb is kept, if all hold."""
         states = list[State]()
         for way in ways:
-            between = self._ways.states(way) if way not in self._ways.barred else []
+            known = way not in self._ways.barred and len(self._ways.states(way)) > 0
+            between = self._ways.fit(way) if known else []
             if not between:
+                if known:
+                    self._bar(way)
                 return way
             if way.before >= 0:
                 lift = self._ways.state(way.before)
-                turns = [(lift, lift), (lift, between[0])]
-                turns += [(states[-2], lift), (states[-2], between[0])]
+                turns = [(lift, between[0]), (states[-2], lift), (states[-2], between[0])]
                 if not all(self._ways.passes(*turn) for turn in turns):
                     self._bar(way)
                     return way

@@ -298,6 +298,27 @@ class Lifts:
             side,
         )
 
+    def find(self, bodies: Indices, members: Indices) -> tuple[Indices, Indices]:
+        """Return the triples and indices of states with three hands (N, L); −1 for none."""
+        count, every, limbs = self.ground.reached.shape
+        rows = np.arange(len(members))
+        air = (members < 0).argmax(axis=1)
+        key = air
+        for limb in range(limbs - 1):
+            key = key * count + members[rows, limb + (limb >= air)]
+        triples, lifts = (
+            np.full(len(rows), -1, dtype=np.intp),
+            np.full(len(rows), -1, dtype=np.intp),
+        )
+        if len(self.keys) and len(self.bodies):
+            at = np.minimum(np.searchsorted(self.keys, key), len(self.keys) - 1)
+            triples = np.where(self.keys[at] == key, at, -1)
+            whole = self.keys[self.triples] * every + self.bodies
+            asked = key * every + bodies
+            at = np.minimum(np.searchsorted(whole, asked), len(whole) - 1)
+            lifts = np.where(whole[at] == asked, at, -1)
+        return triples, lifts
+
     def beside(self, end: int) -> Indices:
         """Return the lifts next to which an end of the climb may be: 0 the start, 1 the goal."""
         from planner.search.compiled_graph import touching

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,12 +19,34 @@ from planner.search.lifts import Ground, Lifts
 from planner.search.programs import Programs
 from planner.search.settings import SEARCH_SETTINGS
 from planner.search.wall import Ends, State, Wall
-from planner.search.ways import Blocked, Passes
+from planner.search.ways import Arc, Moves, Passes, Refuses
 
-__all__ = ["SearchProgress", "search"]
+__all__ = ["SearchMemory", "SearchProgress", "search"]
 
 SearchProgress = Callable[[str, float, float, int], None]
 """Gets what is done, the best climb's least load factor, the bound, and the programs so far."""
+
+
+@dataclass(eq=False)
+class SearchMemory:
+    """What searches of one wall from one start to one goal have learnt.
+
+    Attributes
+    ----------
+    table : ScreeningTable or None
+        With learnt directions; None before the first search.
+    programs : Programs or None
+        All that were solved.
+    bound : float
+        No climb has a larger least load factor.
+    proof : Proof or None
+        What it rests on.
+    """
+
+    table: ScreeningTable | None = None
+    programs: Programs | None = None
+    bound: float = float("inf")
+    proof: Proof | None = None
 
 
 def search(
@@ -35,8 +58,10 @@ def search(
     at_least: float | None = None,
     floor: float = 0.0,
     seconds: float | None = None,
-    blocked: Blocked = frozenset(),
+    blocked: Collection[Arc] = (),
     passes: Passes | None = None,
+    refuses: Refuses | None = None,
+    memory: SearchMemory | None = None,
     progress: SearchProgress | None = None,
 ) -> Found:
     """Find the climb with the largest least load factor, and bound every other.
@@ -55,12 +80,17 @@ def search(
     seconds : float, optional
         Time after which the search ends with what it has, as it does at a deadline of
         `planner.deadline` [s].
-    blocked : frozenset of pairs of State
+    blocked : collection of pairs of State
         Moves that may not be made, which the climb goes round: a state and the next, or the one
         after it. A state twice may not be passed. The bound is that of the statics all the same.
     passes : callable, optional
         Returns whether a state may be followed by another; twice the same, whether it may be passed
         at all. It is asked of climbs that the statics leave; its word does not count for the bound.
+    refuses : callable, optional
+        Returns what cannot be done of a climb, as ``blocked`` has it, from its states; nothing if
+        the climb is to be kept. It is asked of each climb, which the search then goes round.
+    memory : SearchMemory, optional
+        Of searches of the same wall with the same ends; it learns from this one.
     progress : callable, optional
         Called with a phase, the least load factor so far, the bound and the programs solved.
 
@@ -75,7 +105,10 @@ def search(
     for name, value in numbers.items():
         if value is not None and not 0.0 <= value < np.inf:
             raise InvalidInputError(f"must be at least 0, got {value:g}", field=name)
-    search_of = _Search(wall, (start, goal), (blocked, passes), progress, seconds, floor)
+    lifts = {first for first, second in blocked if first == second and -1 in first.members}
+    moves = Moves(set(blocked), passes, refuses, lifts)
+    known = SearchMemory() if memory is None else memory
+    search_of = _Search(wall, (start, goal), moves, known, progress, seconds, floor)
     return search_of.found(within, at_least)
 
 
@@ -90,7 +123,8 @@ class _Search:
         self,
         wall: Wall,
         ends: tuple[Ends, Ends],
-        moves: tuple[Blocked, Passes | None],
+        moves: Moves,
+        memory: SearchMemory,
         progress: SearchProgress | None,
         seconds: float | None,
         floor: float,
@@ -99,10 +133,10 @@ class _Search:
         self._started, self._said, self._phase = time.perf_counter(), -np.inf, ""
         self._end = np.inf if seconds is None else self._started + seconds
         self._ground, self._moves, self._progress = Ground(wall, ends), moves, progress
-        self._table, self._programs = wall.screening, Programs(wall.screening)
+        self._memory, self._table = memory, memory.table or wall.screening
+        self._programs = memory.programs or Programs(wall.screening)
         self._states: tuple[State, ...] = ()
-        self._least, self._bound = -np.inf, np.inf
-        self._proof: Proof | None = None
+        self._least, self._bound, self._proof = -np.inf, memory.bound, memory.proof
         self._lifts = self._relearnt = 0
         bodies, limbs = wall.reach.entry.shape[1:]
         self._doubt, self._failures = np.inf, 0
@@ -206,8 +240,11 @@ class _Search:
 
     def _learn(self) -> None:
         """Learn directions from lifts of the whole wall, then from those that these leave."""
-        settings = SEARCH_SETTINGS
+        settings, memory = SEARCH_SETTINGS, self._memory
         self._report("directions")
+        if memory.table is not None:
+            self._ceiling = self._tried = memory.bound
+            return
         lifts = some_lifts(self._ground, settings.samples, 0)
         half = settings.directions // 2
         self._table = learnt(self._table, self._programs, lifts, half, self._check)
@@ -302,6 +339,10 @@ class _Search:
 
     def _answer(self, finished: bool) -> Found:
         """Return what was found, each state's program solved again by another solver."""
+        if np.isfinite(self._ceiling):
+            memory = self._memory
+            memory.table, memory.programs = self._table, self._programs
+            memory.bound, memory.proof = self._bound, self._proof
         hands, factors = self._table.hands, list[float]()
         for state in self._states:
             members = np.array(state.members)

@@ -27,6 +27,8 @@ class SearchSettings:
     """Part of a multiple that was too much, which is tried next."""
     lowest: float = 0.1
     """Multiple below which the next that is tried is zero."""
+    standing: int = 24
+    """Climbs that only shift the body which may be refused before those that lift are tried."""
     many: int = 300
     """Lifts of a body and a limb in the air from which on only the best are kept at first."""
     silence: float = 1.0

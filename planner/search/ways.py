@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import combinations
+from collections.abc import Callable, Iterable, Sequence
+from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -15,15 +15,39 @@ from planner.search.programs import Programs
 from planner.search.settings import SEARCH_SETTINGS
 from planner.search.wall import State
 
-__all__ = ["Blocked", "Passes", "Way", "Ways"]
+__all__ = ["Arc", "Moves", "Passes", "Refuses", "Way", "Ways"]
 
-Blocked = frozenset[tuple[State, State]]
-"""Moves that may not be made: a state and a later one; a state twice may not be passed at all."""
+Arc = tuple[State, State]
+"""A move: a state and a later one; or twice a state that is passed."""
 
 Passes = Callable[[State, State], bool]
 """Returns whether a state may be followed by another; twice the same, whether it may be passed."""
 
+Refuses = Callable[[Sequence[State]], Iterable[Arc]]
+"""Returns what cannot be done of a climb, from its states; nothing if it is to be kept."""
+
 Bodies = NDArray[np.bool_]
+
+
+class Moves(NamedTuple):
+    """What is known of moves besides the statics.
+
+    Attributes
+    ----------
+    blocked : set of pairs of State
+        Those that may not be made; a state twice may not be passed.
+    passes : callable or None
+        Returns whether one may be made.
+    refuses : callable or None
+        Returns what cannot be done of a climb.
+    refused : set of State
+        States with three hands that may not be passed, as far as is known.
+    """
+
+    blocked: set[Arc]
+    passes: Passes | None
+    refuses: Refuses | None
+    refused: set[State]
 
 
 class Way(NamedTuple):
@@ -49,8 +73,7 @@ class Ways:
     ----------
     lifts : Lifts
     programs : Programs
-    moves : frozenset of pairs of State, and callable
-        Those that may not be made; and whether one may be.
+    moves : Moves
     barred : set of Way
         Ways that blocked moves leave out.
 
@@ -58,19 +81,21 @@ class Ways:
     ----------
     hindered : bool
         Whether something was left out that holds enough.
+    refused : set of State
+        That of the moves.
     """
 
     def __init__(
         self,
         lifts: Lifts,
         programs: Programs,
-        moves: tuple[Blocked, Passes | None],
+        moves: Moves,
         barred: set[Way],
     ) -> None:
         self._lifts, self._programs = lifts, programs
-        self._blocked, self._passes = moves
+        self._moves, self.refused = moves, moves.refused
         self._least = lifts.multiple * (1.0 - 0.1 * SEARCH_SETTINGS.exact)
-        self.stopped = {first for first, second in self._blocked if first == second}
+        self.stopped = {first for first, second in moves.blocked if first == second}
         self.barred, self.hindered = barred, len(barred) > 0
         self._bad, self._good = set[State](), set[State]()
         self._between = dict[Way, list[State]]()
@@ -149,15 +174,40 @@ class Ways:
     def passes(self, before: State, after: State) -> bool:
         """Return whether a move may be made, or a state twice be passed."""
         barred = before in self.stopped or after in self.stopped
-        if barred or (before, after) in self._blocked:
+        if barred or (before, after) in self._moves.blocked:
             return False
-        return self._passes is None or self._passes(before, after)
+        return self._moves.passes is None or self._moves.passes(before, after)
+
+    def fit(self, way: Way) -> list[State]:
+        """Return the four-hand states between two lifts by what is known of moves now."""
+        between = self.states(way)
+        arcs = [*zip(between, between, strict=True), *pairwise(between)]
+        if not all(self.passes(*each) for each in arcs):
+            self.hindered = True
+            del self._between[way]
+            between = self.states(way)
+        # the body goes straight from the first to the last of them
+        if between and (between[0], between[-1]) in self._moves.blocked:
+            return []
+        return between
+
+    def refuse(self, states: Sequence[State]) -> bool:
+        """Return whether something of a climb cannot be done, which is left out from now on."""
+        arcs = () if self._moves.refuses is None else self._moves.refuses(states)
+        found = set(arcs)
+        self._moves.blocked.update(found)
+        twice = {first for first, second in found if first == second}
+        self.stopped |= twice
+        self.refused.update(state for state in twice if -1 in state.members)
+        self.hindered |= len(found) > 0
+        return len(found) > 0
 
     def standing(self) -> tuple[State, ...]:
         """Return a climb that only shifts the body, if there is one."""
         ground, table = self._lifts.ground, self._lifts.table
         starts, goals = (np.asarray(end.bodies, dtype=bool) for end in ground.ends)
         both = np.asarray(ground.reached[:, goals].any(axis=1))
+        left = SEARCH_SETTINGS.standing
         for body in np.flatnonzero(starts).tolist():
             own = list[Indices]()
             for limb, column in enumerate(both.T):
@@ -170,8 +220,10 @@ class Ways:
                 rows = rows[ground.wall.apart[rows[:, i], rows[:, j]]]
             only = np.arange(len(starts)) == body
             for members in map(tuple, rows.tolist()):
-                if states := self._held(members, only, goals):
-                    return tuple(states)
+                while left > 0 and (states := self._held(members, only, goals)):
+                    if not self.refuse(states):
+                        return tuple(states)
+                    left -= 1
         return ()
 
     def state(self, lift: int) -> State:

@@ -1,0 +1,230 @@
+"""Choose the joint angles of all holds of a climb together.
+
+A limb keeps its branch of inverse kinematics until it lifts. So each hold has one way: joint angles
+that are followed through all poses of the body. Those are chosen with which limbs keep apart, and
+joints bear what the hands hold, in all states of the climb.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hand_models.base import Array
+from planner import deadline
+from planner.climbs.holds import HeldState, Stay, holds_of
+from planner.climbs.joint_loads import LimbLoads
+from planner.climbs.move_checks import MoveChecks
+from planner.climbs.routing import ClimbStep
+from planner.route import Failure
+
+__all__ = ["PostureChoice", "Postures"]
+
+
+@dataclass(frozen=True, eq=False)
+class PostureChoice:
+    """Joint angles of a climb.
+
+    Attributes
+    ----------
+    start : dict of str to ndarray, shape (n,)
+        Of each limb at the start [rad].
+    placed : tuple of ndarray, shape (n,)
+        Of the limb of each move on its new placement [rad].
+    """
+
+    start: dict[str, Array]
+    placed: tuple[Array, ...]
+
+
+class _Pair(NamedTuple):
+    """Which ways of two holds keep limbs apart, (k, m), and the states that have both."""
+
+    fits: NDArray[np.bool_]
+    states: tuple[HeldState, ...]
+
+
+class Postures:
+    """Choice of postures; what is found out of holds is kept for further climbs of the same wall.
+
+    Parameters
+    ----------
+    checks : MoveChecks
+    """
+
+    def __init__(self, checks: MoveChecks) -> None:
+        self._wall, self._checks = checks.wall, checks
+        self._clearances, self._programs = checks.clearances, checks.programs
+        self._ways = checks.ways
+        # part of torque limits: between the states joints may bear a little more
+        self._share_at_most = 0.94
+        self._loads = dict[tuple[Stay, int, int], LimbLoads]()
+        self._meets = dict[tuple[Stay, Stay, int, int], NDArray[np.bool_]]()
+        self._shares = dict[tuple[object, ...], float]()
+
+    def choose(self, steps: Sequence[ClimbStep], most: int = 1500) -> PostureChoice | list[Failure]:
+        """Return joint angles for all holds of moves; or the parts of moves that have none.
+
+        Parameters
+        ----------
+        steps : sequence of ClimbStep
+        most : int
+            Ways that are tried at most.
+        """
+        holds, held = holds_of(steps)
+        failures = [
+            self._without_way(hold, [each for each in held if i in each.holds])
+            for i, hold in enumerate(holds)
+            if not self._ways.of(hold)
+        ]
+        pairs = {} if failures else self._pairs(holds, held)
+        failures += [
+            self._met(holds, i, j, states)
+            for (i, j), (fits, states) in pairs.items()
+            if not fits.any()
+        ]
+        if failures:
+            return sorted(failures, key=lambda each: each.move)
+        chosen, failed = list[int](), (-1, held[0], "no posture was found")
+        # depth first, the ways of each hold in their order
+        tried = [0]
+        while tried and most > 0:
+            deadline.check("the postures of a climb were chosen")
+            i = len(chosen)
+            if i == len(holds):
+                break
+            if tried[-1] == len(self._ways.of(holds[i])):
+                tried.pop()
+                if chosen:
+                    chosen.pop()
+                continue
+            most -= 1
+            chosen.append(tried[-1])
+            tried[-1] += 1
+            wrong = self._wrong(holds, held, chosen, pairs)
+            if wrong is None:
+                tried.append(0)
+                continue
+            chosen.pop()
+            if i > failed[0] or (i == failed[0] and wrong[0].move > failed[1].move):
+                failed = (i, *wrong)
+        if len(chosen) < len(holds):
+            _, state, reason = failed
+            limb = None if state.closed is None else state.state.members.index(-1)
+            name = None if limb is None else self._wall.robot.limbs[limb]
+            return [Failure(state.move, state.phase, name, reason)]
+        limbs = self._wall.robot.limbs
+        first = [self._ways.of(hold)[k][0] for hold, k in zip(holds, chosen, strict=True)]
+        return PostureChoice(dict(zip(limbs, first, strict=False)), tuple(first[len(limbs) :]))
+
+    def _wrong(
+        self,
+        holds: Sequence[Stay],
+        held: Sequence[HeldState],
+        chosen: Sequence[int],
+        pairs: Mapping[tuple[int, int], _Pair],
+    ) -> tuple[HeldState, str] | None:
+        """Return a state that the way chosen last does not pass, and why."""
+        new, limbs = len(chosen) - 1, self._wall.robot.limbs
+        for other in range(new):
+            pair = pairs.get((other, new))
+            if pair is not None and not pair.fits[chosen[other], chosen[new]]:
+                names = limbs[holds[other].limb], limbs[holds[new].limb]
+                return pair.states[0], f"{names[0]} meets {names[1]}"
+        for each in held:
+            if max(each.holds) == new:
+                share = self._share(holds, each, chosen)
+                if not share <= self._share_at_most:
+                    return each, f"joints would bear {share:.3g} of their limits"
+        return None
+
+    def _pairs(
+        self, holds: Sequence[Stay], held: Sequence[HeldState]
+    ) -> dict[tuple[int, int], _Pair]:
+        """Return which ways of holds at the same time keep limbs apart."""
+        found = dict[tuple[int, int], _Pair]()
+        for each in held:
+            for i, j in combinations(sorted(each.holds), 2):
+                shape = len(self._ways.of(holds[i])), len(self._ways.of(holds[j]))
+                fits, states = found.get((i, j), _Pair(np.ones(shape, dtype=bool), ()))
+                for back in range(self._pieces(holds[i], each.holds[i], each)):
+                    fits = fits & self._apart(holds, each, (i, j), back)
+                found[i, j] = _Pair(fits, (*states, each))
+        return found
+
+    def _apart(
+        self, holds: Sequence[Stay], held: HeldState, pair: tuple[int, int], back: int
+    ) -> NDArray[np.bool_]:
+        """Return which ways of two holds keep limbs apart in a state, or halfway before it."""
+        first, second = (holds[i] for i in pair)
+        one, two = (self._ways.path(holds[i])[1][held.holds[i]] - back for i in pair)
+        key = first, second, one, two
+        if key not in self._meets:
+            ways = [
+                np.array([way[at] for way in self._ways.of(hold)])
+                for hold, at in ((first, one), (second, two))
+            ]
+            self._meets[key] = self._clearances.apart((first.limb, second.limb), *ways)
+        return self._meets[key]
+
+    def _pieces(self, hold: Stay, part: int, held: HeldState) -> int:
+        """Return the poses of the body to look at: a state's own, and those on the shift to it."""
+        at = self._ways.path(hold)[1]
+        return at[part] - at[part - 1] if held.phase == "shift" else 1
+
+    def _met(self, holds: Sequence[Stay], i: int, j: int, states: Sequence[HeldState]) -> Failure:
+        """Return where two limbs meet whatever their ways are, which is left out from now on."""
+        limbs, fits = self._wall.robot.limbs, np.ones((1, 1), dtype=bool)
+        first, second = holds[i], holds[j]
+        for each in states:
+            for back in range(self._pieces(first, each.holds[i], each)):
+                fits = fits & self._apart(holds, each, (i, j), back)
+            if not np.any(fits):
+                break
+        own = sorted(((first.limb, first.place), (second.limb, second.place)))
+        self._checks.learn_pair(each.state.body, own[0], own[1])
+        reason = f"{limbs[first.limb]} meets {limbs[second.limb]}"
+        return Failure(each.move, each.phase, limbs[second.limb], reason)
+
+    def _share(self, holds: Sequence[Stay], held: HeldState, chosen: Sequence[int]) -> float:
+        """Return the least share of joint torque limits in a state."""
+        own = {holds[i]: (chosen[i], part) for i, part in held.holds.items()}
+        key = held.state, held.closed, *own.items()
+        if key not in self._shares:
+            loads = {hold.limb: self._loads_of(hold, *at) for hold, at in own.items()}
+            more = None
+            if held.closed is not None:
+                wrench = self._checks.closed_wrench(held.closed)
+                if wrench is None:
+                    return float(np.inf)
+                more = -wrench
+            self._shares[key] = self._programs.share(held.state, loads, more)
+        return self._shares[key]
+
+    def _loads_of(self, hold: Stay, way: int, part: int) -> LimbLoads:
+        key = hold, way, part
+        if key not in self._loads:
+            angles = self._ways.of(hold)[way][self._ways.path(hold)[1][part]]
+            body = hold.bodies[part]
+            self._loads[key] = self._programs.loads(hold.limb, hold.place, body, angles)
+        return self._loads[key]
+
+    def _without_way(self, hold: Stay, held: Sequence[HeldState]) -> Failure:
+        """Return the part of a climb in which a hold has no way."""
+        name = self._wall.robot.limbs[hold.limb]
+        first = held[0]
+        for m in range(1, len(hold.bodies) + 1):
+            if self._ways.of(hold._replace(bodies=hold.bodies[:m], lifts=False)):
+                continue
+            if m == 1:
+                reason = f"{name} has no clear way to its hold"
+                return Failure(first.move, "swing" if hold.placed else "start", name, reason)
+            shifts = [each.move for each in held if each.phase == "shift"]
+            reason = f"{name} cannot keep its hold while the body shifts"
+            return Failure(shifts[m - 2], "shift", name, reason)
+        return Failure(held[-1].move, "open", name, f"{name} has no clear way back from its hold")
