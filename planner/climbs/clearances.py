@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array, Indices, Pose
-from planner.motion import CollisionScene, JointSpace, Rock, capsule_distances
+from hand_models.base import Array, Indices, InvalidInputError, Pose
+from planner.motion import CollisionScene, JointSpace, Rock, capsule_distances, rocks_of
+from planner.prepare import settle_each
 from planner.robots import scene_number
 from planner.search import Wall
 
@@ -21,7 +22,7 @@ class Clearances:
     Parameters
     ----------
     wall : Wall
-        Of one rock.
+        Of one rock, or of a rock for each placement.
     """
 
     def __init__(self, wall: Wall) -> None:
@@ -31,6 +32,11 @@ class Clearances:
                 pose = each.pose @ each.hold_in_hand
                 rocks = [Rock("the rock", each.hold, pose, frozenset(self._names))]
                 break
+        if not rocks:
+            settled = zip(wall.places, settle_each(wall.robot.hand, wall.places), strict=True)
+            closed = [(hand, at) for hand, at in settled if not isinstance(at, InvalidInputError)]
+            every = frozenset(self._names)
+            rocks = [rock._replace(limbs=every) for rock in rocks_of(closed)]
         self._scene = CollisionScene(wall.robot, rocks)
         self._least = scene_number("motion", "margin_at_hold")
         self._pairs = dict[tuple[int, int], tuple[Indices, Indices]]()

@@ -1,4 +1,4 @@
-"""Whether joints bear what hands hold a state with: linear programs with rows of joint torques."""
+"""Compute whether joints bear what hands hold a state with: programs with rows of torques."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class PostureChoice:
 
 
 class _Pair(NamedTuple):
-    """Which ways of two holds keep limbs apart, (k, m), and the states that have both."""
+    """Table of the ways of two holds that keep limbs apart, (k, m), and the states with both."""
 
     fits: NDArray[np.bool_]
     states: tuple[HeldState, ...]

@@ -29,7 +29,7 @@ SearchProgress = Callable[[str, float, float, int], None]
 
 @dataclass(eq=False)
 class SearchMemory:
-    """What searches of one wall from one start to one goal have learnt.
+    """Memory of what searches of one wall from one start to one goal have learnt.
 
     Attributes
     ----------

@@ -30,7 +30,7 @@ Bodies = NDArray[np.bool_]
 
 
 class Moves(NamedTuple):
-    """What is known of moves besides the statics.
+    """Knowledge of moves besides the statics.
 
     Attributes
     ----------
