@@ -54,7 +54,7 @@ COMMANDS_BY_NAME: Final = {
     ),
     "climb": Entry(
         "routes",
-        "Search for the best climb on ROCK, with proof how much better any other can be.",
+        "Search for the best climb on each ROCK, with proof how much better any other can be.",
     ),
     "demo": Entry(
         "network",
