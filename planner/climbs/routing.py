@@ -35,7 +35,7 @@ class ClimbStep(NamedTuple):
 
     @classmethod
     def each(cls, states: Sequence[State]) -> list[Self]:
-        """Return the moves of a climb's states."""
+        """Return the moves of a climb's states; of one state a step without any."""
         found = list[Self]()
         shifts, lift = [states[0]], None
         for state in states[1:]:
@@ -46,9 +46,14 @@ class ClimbStep(NamedTuple):
             else:
                 found.append(cls(tuple(shifts), lift, state))
                 shifts, lift = [state], None
-        if len(shifts) > 1:
+        if len(shifts) > 1 or not found:
             found.append(cls(tuple(shifts), None, None))
         return found
+
+    @property
+    def is_shift(self) -> bool:
+        """Return whether the body shifts without a move after it."""
+        return self.lift is None and len(self.shifts) > 1
 
     @property
     def limb(self) -> int:
@@ -116,7 +121,7 @@ class RouteMaker:
                 tuple(hands), wall.bodies[first.body], robot=wall.robot, joints=joints or "solve"
             ),
             moves=tuple(self._move(step, angles) for step, angles in zip_longest(moves, placed)),
-            end=None if last.lift is not None else wall.bodies[last.shifts[-1].body],
+            end=wall.bodies[last.shifts[-1].body] if last.is_shift else None,
             limits=self.limits,
             objective=self._objective,
             explain=False,

@@ -134,6 +134,16 @@ def test_it_is_proven_that_no_climb_has_a_load_factor_that_hands_do_not_hold():
     assert found.bound <= 3.0
 
 
+def test_a_start_that_is_a_goal_is_a_climb_without_moves():
+    wall = knob_wall()
+    found = find_climb(wall, ends(wall, [1], START), ends(wall, [1], START), within=0.1)
+    assert (found.status, found.climb.route.moves) == ("found", ())
+    assert [knot.verified for knot in found.climb.knots] == [True]
+    assert evaluate(found.route, workers=1).load_factor == pytest.approx(found.least, rel=1e-6)
+    assert found.least <= found.bound
+    assert found.deciding.stage == 0
+
+
 def test_without_time_nothing_is_said_of_a_climb():
     wall = knob_wall()
     found = find_climb(wall, ends(wall, [1], START), ends(wall, [1], GOAL), seconds=1e-6)
