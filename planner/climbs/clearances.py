@@ -39,9 +39,12 @@ class Clearances:
             rocks = [rock._replace(limbs=every) for rock in rocks_of(closed)]
         self._scene = CollisionScene(wall.robot, rocks)
         self._least = scene_number("motion", "margin_at_hold")
+        self._swings = scene_number("motion", "margin")
         self._pairs = dict[tuple[int, int], tuple[Indices, Indices]]()
 
-    def apart(self, limbs: tuple[int, int], first: Array, second: Array) -> NDArray[np.bool_]:
+    def apart(
+        self, limbs: tuple[int, int], first: Array, second: Array, *, swings: bool = False
+    ) -> NDArray[np.bool_]:
         """Return which joint angles of two limbs keep them apart.
 
         Parameters
@@ -49,6 +52,8 @@ class Clearances:
         limbs : tuple of (int, int)
         first, second : ndarray, shapes (k, n), (m, n)
             Joint angles of the one and the other [rad].
+        swings : bool
+            Whether the first one swings, with the margin of swings.
 
         Returns
         -------
@@ -62,8 +67,9 @@ class Clearances:
         ]
         i, j = np.indices((len(first), len(second))).reshape(2, -1)
         both = np.ascontiguousarray(np.hstack([segments[0][i], segments[1][j]]))
-        gaps = capsule_distances(both, scene.radii[own], pairs, 0.02)
-        clear = gaps.min(axis=1, initial=np.inf) >= self._least
+        margin = self._swings if swings else self._least
+        gaps = capsule_distances(both, scene.radii[own], pairs, 2.0 * margin)
+        clear = gaps.min(axis=1, initial=np.inf) >= margin
         return np.asarray(clear.reshape(len(first), len(second)))
 
     def of_rock(self, limb: int, bodies: Sequence[Pose], angles: Array, *, holds: bool) -> bool:
@@ -81,7 +87,7 @@ class Clearances:
         """
         name = self._names[limb]
         touching = (name,) if holds else ()
-        margin = self._least if holds else scene_number("motion", "margin")
+        margin = self._least if holds else self._swings
         space = JointSpace(self._scene, bodies, {name: angles[0]}, (name,), touching=touching)
         postures = angles
         if len(bodies) > 1:

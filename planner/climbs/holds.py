@@ -11,12 +11,14 @@ import numpy as np
 from hand_models.base import Array, Pose
 from planner.climbs.clearances import Clearances
 from planner.climbs.routing import ClimbStep
+from planner.climbs.settings import PostureSettings
 from planner.motion import (
     MOTION_SETTINGS,
     BranchEndError,
     branches,
     follow_poses,
     pose_between,
+    straight_off,
 )
 from planner.robots import scene_number
 from planner.route import KnotPhase
@@ -58,6 +60,8 @@ class HeldState(NamedTuple):
         Of each hold, by its index, how many shifts of the body it has had.
     closed : int or None
         Placement at which the limb in the air is closed, without load.
+    air : tuple of int
+        Holds of the limb in the air: that at which it is closed, or those it swings between.
     """
 
     move: int
@@ -65,6 +69,7 @@ class HeldState(NamedTuple):
     state: State
     holds: dict[int, int]
     closed: int | None
+    air: tuple[int, ...]
 
 
 def holds_of(steps: Sequence[ClimbStep]) -> tuple[list[Stay], list[HeldState]]:
@@ -73,11 +78,17 @@ def holds_of(steps: Sequence[ClimbStep]) -> tuple[list[Stay], list[HeldState]]:
     holds = [Stay(limb, p, (first.body,)) for limb, p in enumerate(first.members)]
     now, held = list(range(len(holds))), list[HeldState]()
 
-    def add(move: int, phase: KnotPhase, state: State, closed: int | None = None) -> None:
+    def add(
+        move: int,
+        phase: KnotPhase,
+        state: State,
+        air: tuple[int, ...] = (),
+        closed: int | None = None,
+    ) -> None:
         own = {
             i: len(holds[i].bodies) - 1 for i, p in zip(now, state.members, strict=True) if p >= 0
         }
-        held.append(HeldState(move, phase, state, own, closed))
+        held.append(HeldState(move, phase, state, own, closed, air))
 
     add(0, "start", first)
     for move, step in enumerate(steps, start=1):
@@ -89,10 +100,11 @@ def holds_of(steps: Sequence[ClimbStep]) -> tuple[list[Stay], list[HeldState]]:
             continue
         limb, left = step.limb, now[step.limb]
         holds[left] = holds[left]._replace(lifts=True)
-        add(move, "unload", step.lift, holds[left].place)
-        place = step.place.members[limb]
-        add(move, "close", step.lift, place)
-        now[limb] = len(holds)
+        add(move, "unload", step.lift, (left,), holds[left].place)
+        place, new = step.place.members[limb], len(holds)
+        add(move, "swing", step.lift, (left, new))
+        add(move, "close", step.lift, (new,), place)
+        now[limb] = new
         holds.append(Stay(limb, place, (step.place.body,), placed=True))
         add(move, "load", step.place)
     return holds, held
@@ -105,15 +117,13 @@ class HoldWays:
     ----------
     wall : Wall
     clearances : Clearances
-    most : int
-        Ways of a hold at most.
+    settings : PostureSettings
     """
 
-    def __init__(self, wall: Wall, clearances: Clearances, most: int = 8) -> None:
-        self._wall, self._clearances, self._most = wall, clearances, most
-        # [m] about as far as a climb's set-points are apart
-        self._piece = 0.06
+    def __init__(self, wall: Wall, clearances: Clearances, settings: PostureSettings) -> None:
+        self._wall, self._clearances, self._settings = wall, clearances, settings
         self._known = dict[Stay, list[Array]]()
+        self._off = dict[tuple[Stay, int], list[Array]]()
 
     def of(self, hold: Stay) -> list[Array]:
         """Return joint angles at all poses of `path`, shape (m, n) each [rad].
@@ -124,15 +134,29 @@ class HoldWays:
         if hold not in self._known:
             found = list[Array]()
             for more in (False, True):
-                # others are searched for where the table has none
-                for way in () if found else self._followed(hold, more=more):
+                # others are searched for where the table has few
+                few = len(found) < self._settings.few_ways
+                for way in self._followed(hold, more=more) if few or not more else ():
                     far = (np.abs(way - other).max() for other in found)
                     if min(far, default=np.inf) > MOTION_SETTINGS.alike and self._clear(hold, way):
                         found.append(way)
-                    if len(found) == self._most:
+                    if len(found) == self._settings.ways:
                         break
             self._known[hold] = found
         return self._known[hold]
+
+    def off(self, hold: Stay, end: int) -> list[Array]:
+        """Return of each way the joint angles straight back from the hold, shape (m, n) [rad].
+
+        The hand leaves its rock, or comes to it on the same way, at the first pose of the body or
+        the last one: ``end`` is 0 or −1.
+        """
+        key = hold, end
+        if key not in self._off:
+            robot = self._wall.robot
+            back, name = scene_number("motion", "stand_off"), robot.limbs[hold.limb]
+            self._off[key] = [straight_off(robot, name, way[end], back) for way in self.of(hold)]
+        return self._off[key]
 
     def path(self, hold: Stay) -> tuple[list[Pose], list[int]]:
         """Return the poses of the body with those between, and the index of each of the hold's."""
@@ -140,7 +164,7 @@ class HoldWays:
         path, at = [bodies[0]], [0]
         for before, body in pairwise(bodies):
             away = float(np.linalg.norm(body.position - before.position))
-            pieces = 2 ** max(int(np.ceil(np.log2(max(away, 1e-9) / self._piece))), 1)
+            pieces = 2 ** max(int(np.ceil(np.log2(max(away, 1e-9) / self._settings.step))), 1)
             path += [pose_between(before, body, k / pieces) for k in range(1, pieces)] + [body]
             at.append(len(path) - 1)
         return path, at
@@ -170,16 +194,13 @@ class HoldWays:
 
     def _clear(self, hold: Stay, way: Array) -> bool:
         """Return whether a way is clear of the rock, also where the hand comes or leaves."""
-        wall, (path, _), rocks = self._wall, self.path(hold), self._clearances
-        name, hand = wall.robot.limbs[hold.limb], wall.places[hold.place].pose
-        back = scene_number("motion", "stand_off")
+        robot, (path, _), rocks = self._wall.robot, self.path(hold), self._clearances
+        name, back = robot.limbs[hold.limb], scene_number("motion", "stand_off")
         for end in [0] * hold.placed + [-1] * hold.lifts:
-            pose = path[end].inverse() @ hand
-            away = Pose(pose.position - back * pose.rotation[:, 2], pose.rotation)
             try:
-                off = follow_poses(wall.robot, name, way[end], [away])
+                off = straight_off(robot, name, way[end], back)
             except BranchEndError:
                 return False
-            if not rocks.of_rock(hold.limb, [path[end]], off, holds=False):
+            if not rocks.of_rock(hold.limb, [path[end]], off[-1:], holds=False):
                 return False
         return rocks.of_rock(hold.limb, path, way, holds=True)

@@ -11,7 +11,7 @@ from hand_models.base import Array, Pose, wrench_transport
 from planner.prepare import torque_limits
 from planner.programs import WRENCH_UNIT, SilentHighs
 from planner.question import EARTH_GRAVITY, Limits, Question, Stance
-from planner.screening import StanceIndices
+from planner.reach import LimbChain
 from planner.search import State, Wall
 
 __all__ = ["JointLoadPrograms", "LimbLoads"]
@@ -26,10 +26,13 @@ class LimbLoads(NamedTuple):
         Without a wrench, from the limb's weight, of the k joints with a motor [1].
     hand : ndarray, shape (k, 6)
         By the wrench of the rock on the robot, in the axes of W, in `WRENCH_UNIT`.
+    moment : ndarray, shape (3,)
+        That the limb's weight needs besides what it needs at rest angles, in `WRENCH_UNIT`.
     """
 
     still: Array
     hand: Array
+    moment: Array
 
 
 class JointLoadPrograms:
@@ -49,6 +52,7 @@ class JointLoadPrograms:
         first = wall.places[0]
         stance = Stance((first,), wall.bodies[0], robot=wall.robot)
         self._limits = torque_limits(Question(stance, limits=limits))
+        self._chains = [LimbChain.of(wall.robot, name) for name in wall.robot.limbs]
 
     def loads(self, limb: int, place: int, body: int, angles: Array) -> LimbLoads:
         """Return the joint loads of a limb that holds a placement at joint angles (n,) [rad]."""
@@ -65,7 +69,19 @@ class JointLoadPrograms:
         return LimbLoads(
             (still / np.where(driven, most, 1.0))[driven],
             ((jacobian.T @ into) / np.where(driven, most, 1.0)[:, None])[driven],
+            self.moment(limb, body, angles),
         )
+
+    def moment(self, limb: int, body: int, angles: Array) -> Array:
+        """Return the moment that a limb's weight needs besides that at rest angles, (3,).
+
+        It is in the axes of W, in `WRENCH_UNIT`, as of `limb_moments`, for joint angles (n,) [rad].
+        """
+        robot, chain = self._wall.robot, self._chains[limb]
+        rest = robot.chains[robot.limbs[limb]].rest
+        away = (chain.centres(angles[None]) - chain.centres(rest[None]))[0]
+        arm = self._wall.bodies[body].rotation @ (chain.masses.sum() * away)
+        return np.asarray(np.cross(arm, -np.array(EARTH_GRAVITY)) / WRENCH_UNIT[3:])
 
     def share(
         self, state: State, loads: Mapping[int, LimbLoads], more: Array | None = None
@@ -76,15 +92,15 @@ class JointLoadPrograms:
         ----------
         state : State
         loads : mapping of int to LimbLoads
-            Of limbs that count, by limb.
+            Of each limb on the rock, by limb.
         more : ndarray, shape (6,), optional
-            Wrench that the hands supply besides that for the robot's weight, in `WRENCH_UNIT`.
+            Wrench that the hands supply besides that for the robot's weight with the limb in the
+            air at rest angles, in `WRENCH_UNIT`.
         """
         hands, members = self._wall.screening.hands, np.array(state.members)
-        asked = StanceIndices(np.array([state.body]), members[None])
-        needed = self._wall.screening.needed(asked)[0]
-        needed = needed if more is None else needed + more
         limbs = np.flatnonzero(members >= 0).tolist()
+        needed = self._wall.screening.wrenches[state.body] + (0.0 if more is None else more)
+        needed[3:] += sum(loads[limb].moment for limb in limbs)
         parts = {limb: hands.part_of(int(members[limb])) for limb in limbs}
         ends = np.cumsum([1, *(each[0].stop - each[0].start for each in parts.values())])
         columns, size = dict(zip(limbs, ends, strict=False)), int(ends[-1])
@@ -110,11 +126,10 @@ class JointLoadPrograms:
             bounded = np.isfinite(hands.room[p])
             room = hands.room[p, bounded]
             add(hands.rows[own][:, bounded].T, at, np.full(len(room), -np.inf), room)
-            if limb in loads:
-                still, hand = loads[limb]
-                base, free = still + hand @ hands.base[p], np.full(len(still), np.inf)
-                add(hand @ points.T, at, -free, -base, 1.0)
-                add(hand @ points.T, at, -base, free, -1.0)
+            still, hand, _ = loads[limb]
+            base, free = still + hand @ hands.base[p], np.full(len(still), np.inf)
+            add(hand @ points.T, at, -free, -base, 1.0)
+            add(hand @ points.T, at, -base, free, -1.0)
         rows.append(balance)
         every = np.vstack(rows)
         low, high = (np.concatenate([*ends_of, needed]) for ends_of in (least, most))

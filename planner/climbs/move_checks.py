@@ -18,6 +18,7 @@ from hand_models.base import Array, CruxError, Pose, wrench_transport
 from planner.climbs.clearances import Clearances
 from planner.climbs.holds import HoldWays, Stay
 from planner.climbs.joint_loads import JointLoadPrograms, LimbLoads
+from planner.climbs.settings import PostureSettings
 from planner.prepare import hand_space
 from planner.programs import WRENCH_UNIT
 from planner.question import Limits, Stance
@@ -36,10 +37,14 @@ class MoveChecks:
     wall : Wall
     limits : Limits, optional
         Of every stage.
+    settings : PostureSettings, optional
     """
 
-    def __init__(self, wall: Wall, limits: Limits | None = None) -> None:
+    def __init__(
+        self, wall: Wall, limits: Limits | None = None, settings: PostureSettings | None = None
+    ) -> None:
         self.wall, self._limits = wall, limits or Limits()
+        self.settings = settings or PostureSettings()
         self._least = 1.0 / self._limits.utilisation
         self._closed = dict[int, Array | None]()
         self._known = dict[tuple[State, int], bool]()
@@ -50,15 +55,13 @@ class MoveChecks:
         self._lost = dict[tuple[int, int], set[tuple[int, int]]]()
         self.clearances = Clearances(wall)
         self.programs = JointLoadPrograms(wall, self._limits)
-        self.ways = HoldWays(wall, self.clearances)
+        self.ways = HoldWays(wall, self.clearances, self.settings)
 
     def passes(self, before: State, after: State) -> bool:
         """Return whether one state may follow another: by a lift, a placement or a shift."""
         if before == after:
             if before not in self._fits:
-                clear = next(self._clear(before), None) is not None
-                # what four hands hold is seen to where one of them lifts
-                self._fits[before] = clear and (-1 not in before.members or self._borne(before))
+                self._fits[before] = self._borne(before)
             return self._fits[before] and not self._meeting(before)
         if before.body != after.body:
             ends = min(before.body, after.body), max(before.body, after.body)
@@ -104,13 +107,13 @@ class MoveChecks:
     def _borne(self, state: State, more: Array | None = None) -> bool:
         """Return whether limbs keep clear of each other at joint angles that bear the loads.
 
-        ``more``, shape (6,), is what hands supply besides, in `WRENCH_UNIT`.
+        ``more`` is as of `JointLoadPrograms.share`.
         """
         own = {limb: place for limb, place in enumerate(state.members) if place >= 0}
         loads = {limb: self._loads_of(limb, place, state.body) for limb, place in own.items()}
         for chosen in self._clear(state):
             picked = {limb: loads[limb][k] for limb, k in chosen.items()}
-            if self.programs.share(state, picked, more) <= 0.94:
+            if self.programs.share(state, picked, more) <= self.settings.torque_share:
                 return True
         return False
 
@@ -160,7 +163,12 @@ class MoveChecks:
         needed = screening.needed(StanceIndices(np.array([whole.body]), members[None]))[0]
         found = solve_stance(screening.hands, np.delete(members, limb), needed - own).factor
         # a solver that fails proves nothing: the whole planner decides
-        return bool(np.isnan(found) or found >= self._least) and self._borne(lift, -own)
+        if not (np.isnan(found) or found >= self._least):
+            return False
+        # the limb is in the air, and where its placement is
+        more = -own
+        more[3:] += screening.moments[whole.body, limb, members[limb]]
+        return self._borne(lift, more)
 
     def closed_wrench(self, place: int) -> Array | None:
         """Return the rock's wrench on a closed hand without load, (6,); None if it cannot close."""

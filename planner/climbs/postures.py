@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -60,23 +60,16 @@ class Postures:
     def __init__(self, checks: MoveChecks) -> None:
         self._wall, self._checks = checks.wall, checks
         self._clearances, self._programs = checks.clearances, checks.programs
-        self._ways = checks.ways
-        # part of torque limits: between the states joints may bear a little more
-        self._share_at_most = 0.94
+        self._ways, self._settings = checks.ways, checks.settings
         self._loads = dict[tuple[Stay, int, int], LimbLoads]()
         self._meets = dict[tuple[Stay, Stay, int, int], NDArray[np.bool_]]()
+        self._off = dict[tuple[Stay, int, Stay, int], NDArray[np.bool_]]()
+        self._moments = dict[tuple[object, ...], Array]()
         self._shares = dict[tuple[object, ...], float]()
 
-    def choose(self, steps: Sequence[ClimbStep], most: int = 1500) -> PostureChoice | list[Failure]:
-        """Return joint angles for all holds of moves; or the parts of moves that have none.
-
-        Parameters
-        ----------
-        steps : sequence of ClimbStep
-        most : int
-            Ways that are tried at most.
-        """
-        holds, held = holds_of(steps)
+    def choose(self, steps: Sequence[ClimbStep]) -> PostureChoice | list[Failure]:
+        """Return joint angles for all holds of moves; or the parts of moves that have none."""
+        (holds, held), most = holds_of(steps), self._settings.tries
         failures = [
             self._without_way(hold, [each for each in held if i in each.holds])
             for i, hold in enumerate(holds)
@@ -115,7 +108,7 @@ class Postures:
                 failed = (i, *wrong)
         if len(chosen) < len(holds):
             _, state, reason = failed
-            limb = None if state.closed is None else state.state.members.index(-1)
+            limb = state.state.members.index(-1) if state.air else None
             name = None if limb is None else self._wall.robot.limbs[limb]
             return [Failure(state.move, state.phase, name, reason)]
         limbs = self._wall.robot.limbs
@@ -137,9 +130,9 @@ class Postures:
                 names = limbs[holds[other].limb], limbs[holds[new].limb]
                 return pair.states[0], f"{names[0]} meets {names[1]}"
         for each in held:
-            if max(each.holds) == new:
+            if max(*each.holds, *each.air) == new:
                 share = self._share(holds, each, chosen)
-                if not share <= self._share_at_most:
+                if not share <= self._settings.torque_share:
                     return each, f"joints would bear {share:.3g} of their limits"
         return None
 
@@ -155,7 +148,32 @@ class Postures:
                 for back in range(self._pieces(holds[i], each.holds[i], each)):
                     fits = fits & self._apart(holds, each, (i, j), back)
                 found[i, j] = _Pair(fits, (*states, each))
+            for i, j in product(each.air if each.closed is not None else (), each.holds):
+                passes = self._passes(holds, each, i, j)
+                one, two = min(i, j), max(i, j)
+                passes = passes if i < j else passes.T
+                fits, states = found.get((one, two), _Pair(np.ones_like(passes), ()))
+                found[one, two] = _Pair(fits & passes, (*states, each))
         return found
+
+    def _passes(
+        self, holds: Sequence[Stay], held: HeldState, leaves: int, stays: int
+    ) -> NDArray[np.bool_]:
+        """Return with which ways a limb passes another straight off its hold, or onto it."""
+        first, second, end = holds[leaves], holds[stays], -1 if held.phase == "unload" else 0
+        at = self._ways.path(second)[1][held.holds[stays]]
+        key = first, end, second, at
+        if key not in self._off:
+            still = np.array([way[at] for way in self._ways.of(second)])
+            limbs, apart = (first.limb, second.limb), self._clearances.apart
+            self._off[key] = np.array(
+                [
+                    apart(limbs, off[:-1], still).all(axis=0)
+                    & apart(limbs, off[-1:], still, swings=True)[0]
+                    for off in self._ways.off(first, end)
+                ]
+            )
+        return self._off[key]
 
     def _apart(
         self, holds: Sequence[Stay], held: HeldState, pair: tuple[int, int], back: int
@@ -182,29 +200,65 @@ class Postures:
         limbs, fits = self._wall.robot.limbs, np.ones((1, 1), dtype=bool)
         first, second = holds[i], holds[j]
         for each in states:
+            if i in each.air or j in each.air:
+                continue
             for back in range(self._pieces(first, each.holds[i], each)):
                 fits = fits & self._apart(holds, each, (i, j), back)
             if not np.any(fits):
-                break
-        own = sorted(((first.limb, first.place), (second.limb, second.place)))
-        self._checks.learn_pair(each.state.body, own[0], own[1])
-        reason = f"{limbs[first.limb]} meets {limbs[second.limb]}"
-        return Failure(each.move, each.phase, limbs[second.limb], reason)
+                own = sorted(((first.limb, first.place), (second.limb, second.place)))
+                self._checks.learn_pair(each.state.body, own[0], own[1])
+                reason = f"{limbs[first.limb]} meets {limbs[second.limb]}"
+                return Failure(each.move, each.phase, limbs[second.limb], reason)
+        # they do as one of them leaves its hold, or comes to it
+        each = next(each for each in states if i in each.air or j in each.air)
+        leaves, stays = (first, second) if i in each.air else (second, first)
+        reason = f"{limbs[leaves.limb]} has no straight way past {limbs[stays.limb]}"
+        return Failure(each.move, each.phase, limbs[leaves.limb], reason)
 
     def _share(self, holds: Sequence[Stay], held: HeldState, chosen: Sequence[int]) -> float:
         """Return the least share of joint torque limits in a state."""
         own = {holds[i]: (chosen[i], part) for i, part in held.holds.items()}
-        key = held.state, held.closed, *own.items()
+        air = tuple((holds[i], chosen[i]) for i in held.air)
+        key = held.state, held.phase, air, *own.items()
         if key not in self._shares:
             loads = {hold.limb: self._loads_of(hold, *at) for hold, at in own.items()}
-            more = None
+            more = np.zeros(6)
             if held.closed is not None:
                 wrench = self._checks.closed_wrench(held.closed)
                 if wrench is None:
                     return float(np.inf)
-                more = -wrench
-            self._shares[key] = self._programs.share(held.state, loads, more)
+                more -= wrench
+            moments = self._in_air(air, held) if air else np.zeros((1, 3))
+            share = 0.0
+            for moment in moments:
+                all_ = more + np.array([*np.zeros(3), *moment])
+                share = max(share, self._programs.share(held.state, loads, all_))
+                if not share <= self._settings.torque_share:
+                    break
+            self._shares[key] = share
         return self._shares[key]
+
+    def _in_air(self, air: Sequence[tuple[Stay, int]], held: HeldState) -> Array:
+        """Return moments that the weight of the limb in the air needs, shape (m, 3).
+
+        They are those at its hold, or on the straight line in joint space from the end of the
+        straight way off one hold to the beginning of that onto the next.
+        """
+        key = tuple(air), held.phase, held.state.body
+        if key not in self._moments:
+            (first, way), (last, goal) = air[0], air[-1]
+            if held.closed is not None:
+                end = -1 if held.phase == "unload" else 0
+                angles = self._ways.of(first)[way][end][None]
+            else:
+                parts = np.linspace(0.0, 1.0, self._settings.swing_parts + 1)[:, None]
+                off = self._ways.off(first, -1)[way][-1]
+                angles = off + parts * (self._ways.off(last, 0)[goal][-1] - off)
+            body = held.state.body
+            self._moments[key] = np.array(
+                [self._programs.moment(first.limb, body, each) for each in angles]
+            )
+        return self._moments[key]
 
     def _loads_of(self, hold: Stay, way: int, part: int) -> LimbLoads:
         key = hold, way, part

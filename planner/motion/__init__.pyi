@@ -18,6 +18,7 @@ from .swings import (
     NoWayError as NoWayError,
     Swing as Swing,
     clear_branches as clear_branches,
+    straight_off as straight_off,
     swing as swing,
 )
 from .ways import Clear as Clear, check_way as check_way

@@ -19,7 +19,7 @@ from planner.motion.settings import MOTION_SETTINGS
 from planner.motion.ways import Clear, check_way, search_way, way_length
 from planner.robots import Robot, scene_number
 
-__all__ = ["NoWayError", "Swing", "clear_branches", "swing"]
+__all__ = ["NoWayError", "Swing", "clear_branches", "straight_off", "swing"]
 
 
 class NoWayError(InvalidInputError):
@@ -136,7 +136,7 @@ def swing(
     def leaving(angles: Array, which: str) -> Array:
         """Return joint angles, shape (m, n), with which the hand goes straight back from a hold."""
         held = JointSpace(scene, [body], {**joints, limb: angles}, (limb,), touching=robot.limbs)
-        way = _straight(robot, limb, angles, stand_off)
+        way = straight_off(robot, limb, angles, stand_off)
         _require(limb, check_way(held, way, near), f"beside its {which} hold", near)
         _require(limb, check_way(free, way[-1:], margin), f"in front of its {which} hold", margin)
         return way
@@ -199,8 +199,23 @@ def _shortest(
     return _Way(found[0], onto[which], found[1], "searched")
 
 
-def _straight(robot: Robot, limb: str, angles: Array, stand_off: float) -> Array:
-    """Return joint angles, shape (m, n), with which a hand goes straight back from its hold."""
+def straight_off(robot: Robot, limb: str, angles: Array, stand_off: float) -> Array:
+    """Return joint angles with which a hand goes straight back from its hold, shape (m, n) [rad].
+
+    Parameters
+    ----------
+    robot : Robot
+    limb : str
+    angles : ndarray, shape (n,)
+        On the hold, the first of those returned [rad].
+    stand_off : float
+        Distance along −z of H [m].
+
+    Raises
+    ------
+    BranchEndError
+        If the limb cannot follow.
+    """
     pose = robot.hand_poses({limb: angles})[limb]
     away = np.linspace(0.0, stand_off, 6)[1:, None] * -pose.rotation[:, 2]
     poses = [Pose(pose.position + each, pose.rotation) for each in away]
