@@ -49,6 +49,14 @@ class _Pair(NamedTuple):
     states: tuple[HeldState, ...]
 
 
+class _Conflict(NamedTuple):
+    """A state that ways of some holds, by their indices, do not pass."""
+
+    state: HeldState
+    reason: str
+    holds: set[int]
+
+
 class Postures:
     """Choice of postures; what is found out of holds is kept for further climbs of the same wall.
 
@@ -84,28 +92,32 @@ class Postures:
         if failures:
             return sorted(failures, key=lambda each: each.move)
         chosen, failed = list[int](), (-1, held[0], "no posture was found")
-        # depth first, the ways of each hold in their order
-        tried = [0]
-        while tried and most > 0:
+        # depth first; back to the last hold in a conflict
+        leaves = {each.air[1]: each.air[0] for each in held if each.phase == "swing"}
+        orders, conflicts = [self._order(holds, chosen, leaves)], [set[int]()]
+        while len(chosen) < len(holds) and most > 0:
             deadline.check("the postures of a climb were chosen")
             i = len(chosen)
-            if i == len(holds):
-                break
-            if tried[-1] == len(self._ways.of(holds[i])):
-                tried.pop()
-                if chosen:
-                    chosen.pop()
+            if not orders[i]:
+                own = conflicts[i]
+                if not own:
+                    break
+                back = max(own)
+                del chosen[back:], orders[back + 1 :], conflicts[back + 1 :]
+                conflicts[back] |= own - {back}
                 continue
             most -= 1
-            chosen.append(tried[-1])
-            tried[-1] += 1
+            chosen.append(orders[i].pop(0))
             wrong = self._wrong(holds, held, chosen, pairs)
             if wrong is None:
-                tried.append(0)
+                if len(chosen) < len(holds):
+                    orders.append(self._order(holds, chosen, leaves))
+                    conflicts.append(set())
                 continue
             chosen.pop()
-            if i > failed[0] or (i == failed[0] and wrong[0].move > failed[1].move):
-                failed = (i, *wrong)
+            conflicts[i] |= wrong.holds - {i}
+            if i > failed[0] or (i == failed[0] and wrong.state.move > failed[1].move):
+                failed = (i, wrong.state, wrong.reason)
         if len(chosen) < len(holds):
             _, state, reason = failed
             limb = state.state.members.index(-1) if state.air else None
@@ -115,25 +127,41 @@ class Postures:
         first = [self._ways.of(hold)[k][0] for hold, k in zip(holds, chosen, strict=True)]
         return PostureChoice(dict(zip(limbs, first, strict=False)), tuple(first[len(limbs) :]))
 
+    def _order(
+        self, holds: Sequence[Stay], chosen: Sequence[int], leaves: Mapping[int, int]
+    ) -> list[int]:
+        """Return the ways of the next hold in the order in which they are tried.
+
+        Those to which joints turn least from the hold that the limb leaves come first.
+        """
+        new = len(chosen)
+        if new not in leaves:
+            return [*range(len(self._ways.of(holds[new])))]
+        old = leaves[new]
+        start = self._ways.off(holds[old], -1)[chosen[old]][-1]
+        far = [float(np.abs(off[-1] - start).max()) for off in self._ways.off(holds[new], 0)]
+        return [int(k) for k in np.argsort(far, kind="stable")]
+
     def _wrong(
         self,
         holds: Sequence[Stay],
         held: Sequence[HeldState],
         chosen: Sequence[int],
         pairs: Mapping[tuple[int, int], _Pair],
-    ) -> tuple[HeldState, str] | None:
+    ) -> _Conflict | None:
         """Return a state that the way chosen last does not pass, and why."""
         new, limbs = len(chosen) - 1, self._wall.robot.limbs
         for other in range(new):
             pair = pairs.get((other, new))
             if pair is not None and not pair.fits[chosen[other], chosen[new]]:
                 names = limbs[holds[other].limb], limbs[holds[new].limb]
-                return pair.states[0], f"{names[0]} meets {names[1]}"
+                return _Conflict(pair.states[0], f"{names[0]} meets {names[1]}", {other, new})
         for each in held:
             if max(*each.holds, *each.air) == new:
                 share = self._share(holds, each, chosen)
                 if not share <= self._settings.torque_share:
-                    return each, f"joints would bear {share:.3g} of their limits"
+                    reason = f"joints would bear {share:.3g} of their limits"
+                    return _Conflict(each, reason, {*each.holds, *each.air})
         return None
 
     def _pairs(
