@@ -16,7 +16,7 @@ from planner.climbs.found_climb import FoundClimb
 from planner.climbs.move_checks import MoveChecks
 from planner.climbs.other_bodies import detours
 from planner.climbs.outcome import ClimbStatus, DecidingStage, Raise, RefusedMoves
-from planner.climbs.postures import Postures
+from planner.climbs.postures import PostureChoice, Postures, Swung
 from planner.climbs.raising import raises
 from planner.climbs.routing import ClimbStep, RouteMaker
 from planner.deadline import DeadlineError
@@ -239,12 +239,24 @@ class _Finder:
 
     def _climb(self, states: Sequence[State]) -> _Tried:
         """Choose postures for states, and plan the moves."""
-        begun = time.perf_counter()
-        steps = ClimbStep.each(states)
-        chosen = self._postures.choose(steps)
-        self._seconds["postures"] += time.perf_counter() - begun
-        if isinstance(chosen, list):
-            return _Tried(None, tuple(chosen))
+        steps, without, best = ClimbStep.each(states), frozenset[Swung](), None
+        for _ in range(self._checks.settings.plans):
+            begun = time.perf_counter()
+            chosen = self._postures.choose(steps, without)
+            self._seconds["postures"] += time.perf_counter() - begun
+            if isinstance(chosen, list):
+                return best or _Tried(None, tuple(chosen))
+            tried = self._plan(steps, chosen)
+            if tried.failure is None:
+                return tried
+            if best is None or best.failure is None or tried.failure.move > best.failure.move:
+                best = tried
+            without |= self._postures.refuse(steps, chosen, tried.failure)
+        assert best is not None
+        return best
+
+    def _plan(self, steps: Sequence[ClimbStep], chosen: PostureChoice) -> _Tried:
+        """Plan the moves with joint angles that were chosen."""
         start = steps[0].shifts[0], [angles.tobytes() for angles in chosen.start.values()]
         after = self._before if start == self._began else None
         climb = plan_climb(

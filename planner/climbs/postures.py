@@ -7,7 +7,7 @@ joints bear what the hands hold, in all states of the climb.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 from typing import NamedTuple
@@ -23,7 +23,10 @@ from planner.climbs.move_checks import MoveChecks
 from planner.climbs.routing import ClimbStep
 from planner.route import Failure
 
-__all__ = ["PostureChoice", "Postures"]
+__all__ = ["PostureChoice", "Postures", "Swung"]
+
+Swung = tuple[int, int, int, int]
+"""A limb's swing: a hold with its way, and the next one with its own, by their numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,10 +39,13 @@ class PostureChoice:
         Of each limb at the start [rad].
     placed : tuple of ndarray, shape (n,)
         Of the limb of each move on its new placement [rad].
+    ways : tuple of int
+        Number of each hold's way.
     """
 
     start: dict[str, Array]
     placed: tuple[Array, ...]
+    ways: tuple[int, ...]
 
 
 class _Pair(NamedTuple):
@@ -75,8 +81,13 @@ class Postures:
         self._moments = dict[tuple[object, ...], Array]()
         self._shares = dict[tuple[object, ...], float]()
 
-    def choose(self, steps: Sequence[ClimbStep]) -> PostureChoice | list[Failure]:
-        """Return joint angles for all holds of moves; or the parts of moves that have none."""
+    def choose(
+        self, steps: Sequence[ClimbStep], without: Collection[Swung] = ()
+    ) -> PostureChoice | list[Failure]:
+        """Return joint angles for all holds of moves; or the parts of moves that have none.
+
+        Swings of ``without`` are left out.
+        """
         (holds, held), most = holds_of(steps), self._settings.tries
         failures = [
             self._without_way(hold, [each for each in held if i in each.holds])
@@ -109,6 +120,11 @@ class Postures:
             most -= 1
             chosen.append(orders[i].pop(0))
             wrong = self._wrong(holds, held, chosen, pairs)
+            if wrong is None and i in leaves:
+                old = leaves[i]
+                if (old, chosen[old], i, chosen[i]) in without:
+                    state = next(each for each in held if each.air == (old, i))
+                    wrong = _Conflict(state, "no swing was found", {old, i})
             if wrong is None:
                 if len(chosen) < len(holds):
                     orders.append(self._order(holds, chosen, leaves))
@@ -125,7 +141,26 @@ class Postures:
             return [Failure(state.move, state.phase, name, reason)]
         limbs = self._wall.robot.limbs
         first = [self._ways.of(hold)[k][0] for hold, k in zip(holds, chosen, strict=True)]
-        return PostureChoice(dict(zip(limbs, first, strict=False)), tuple(first[len(limbs) :]))
+        start = dict(zip(limbs, first, strict=False))
+        return PostureChoice(start, tuple(first[len(limbs) :]), tuple(chosen))
+
+    def refuse(
+        self, steps: Sequence[ClimbStep], choice: PostureChoice, failure: Failure
+    ) -> frozenset[Swung]:
+        """Take a choice out of further ones whose moves have no plan at a part of a move.
+
+        The ways of all holds there are not chosen together again. What is returned is how the limb
+        would swing if it fails to, for the next choice to leave out.
+        """
+        holds, held = holds_of(steps)
+        phase = "unload" if failure.phase == "open" else failure.phase
+        for each in held:
+            if (each.move, each.phase) == (failure.move, phase):
+                self._shares[self._key(holds, each, choice.ways)] = np.inf
+                if phase == "swing":
+                    old, new = each.air
+                    return frozenset({(old, choice.ways[old], new, choice.ways[new])})
+        return frozenset()
 
     def _order(
         self, holds: Sequence[Stay], chosen: Sequence[int], leaves: Mapping[int, int]
@@ -245,10 +280,10 @@ class Postures:
 
     def _share(self, holds: Sequence[Stay], held: HeldState, chosen: Sequence[int]) -> float:
         """Return the least share of joint torque limits in a state."""
-        own = {holds[i]: (chosen[i], part) for i, part in held.holds.items()}
-        air = tuple((holds[i], chosen[i]) for i in held.air)
-        key = held.state, held.phase, air, *own.items()
+        key = self._key(holds, held, chosen)
         if key not in self._shares:
+            own = {holds[i]: (chosen[i], part) for i, part in held.holds.items()}
+            air = tuple((holds[i], chosen[i]) for i in held.air)
             loads = {hold.limb: self._loads_of(hold, *at) for hold, at in own.items()}
             more = np.zeros(6)
             if held.closed is not None:
@@ -265,6 +300,13 @@ class Postures:
                     break
             self._shares[key] = share
         return self._shares[key]
+
+    @staticmethod
+    def _key(holds: Sequence[Stay], held: HeldState, chosen: Sequence[int]) -> tuple[object, ...]:
+        """Return what the loads of a state depend on."""
+        air = tuple((holds[i], chosen[i]) for i in held.air)
+        own = ((holds[i], chosen[i], part) for i, part in held.holds.items())
+        return held.state, held.phase, air, *own
 
     def _in_air(self, air: Sequence[tuple[Stay, int]], held: HeldState) -> Array:
         """Return moments that the weight of the limb in the air needs, shape (m, 3).

@@ -24,5 +24,7 @@ class PostureSettings:
     """Ways of a hold at most: a limb of seven joints has some four to eight kinds of them."""
     few_ways: int = 4
     """Ways of a hold from the reach table below which others are searched for."""
+    plans: int = 8
+    """Choices of joint angles whose moves are planned for one climb, at most."""
     tries: int = 1500
     """Ways that are tried for one climb at most; where a climb has a choice, a hundred do."""

@@ -147,8 +147,8 @@ def holds_command(
 ) -> int:
     """Propose holds on ROCK, a mesh in metres (of a scan, `crux rock` makes one).
 
-    In place of a file, ROCK may be a generated wall: leaning-wall, blocked-wall or small-wall, each
-    also with a seed (leaning-wall:3).
+    In place of a file, ROCK may be a generated wall: leaning-wall, blocked-wall, small-wall or
+    knob-wall, each also with a seed (leaning-wall:3).
 
     A hand is closed at every point of a grid, at several angles of its wrist; it approaches against
     the mean normal of the rock under its palm. Holds are sorted by the pull-off, with every other

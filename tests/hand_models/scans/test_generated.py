@@ -35,7 +35,7 @@ def test_a_seed_is_a_wall():
     assert read_rock(Path("small-wall:3")).vertices.tobytes() == first.vertices.tobytes()
 
 
-@pytest.mark.parametrize("name", ["small-wall", "blocked-wall"])
+@pytest.mark.parametrize("name", ["small-wall", "blocked-wall", "knob-wall"])
 def test_it_has_the_size_and_the_side_that_it_says(name):
     wall, table = generate_wall(name), wall_table()
     sides = [table.scalar(name, "height"), table.scalar(name, "width")]
@@ -118,7 +118,7 @@ def test_a_file_comes_before_a_wall_of_its_name(tmp_path, monkeypatch):
 
 
 def test_impossible_numbers():
-    assert wall_names() == ("leaning-wall", "blocked-wall", "small-wall")
+    assert wall_names() == ("leaning-wall", "blocked-wall", "small-wall", "knob-wall")
     with pytest.raises(InvalidInputError, match="unknown wall 'high'"):
         generate_wall("high")
     with pytest.raises(InvalidInputError, match="at least 0, got -1"):
