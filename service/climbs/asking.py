@@ -79,10 +79,10 @@ def demo_request() -> requests.ClimbRequest:
         name="knob-wall",
         rock="knob-wall",
         start=requests.ClimbEnd(height=0.86),
-        goal=requests.ClimbEnd(height=1.2),
+        goal=requests.ClimbEnd(height=1.235),
         places=PlaceGrid(spacing=0.2),
         bodies=BodyGrid(spacing=0.2, margin=0.65, stand_offs=(0.6, 0.7)),
-        best_within=1.0,
+        best_within=0.3,
         time=400.0,
     )
 
