@@ -61,7 +61,9 @@ class MoveChecks:
         """Return whether one state may follow another: by a lift, a placement or a shift."""
         if before == after:
             if before not in self._fits:
-                self._fits[before] = self._borne(before)
+                clear = next(self._clear(before), None) is not None
+                # what four hands hold is seen to where one of them lifts
+                self._fits[before] = clear and (-1 not in before.members or self._borne(before))
             return self._fits[before] and not self._meeting(before)
         if before.body != after.body:
             ends = min(before.body, after.body), max(before.body, after.body)
@@ -168,7 +170,7 @@ class MoveChecks:
         # the limb is in the air, and where its placement is
         more = -own
         more[3:] += screening.moments[whole.body, limb, members[limb]]
-        return self._borne(lift, more)
+        return self._borne(lift, more) and self._borne(whole)
 
     def closed_wrench(self, place: int) -> Array | None:
         """Return the rock's wrench on a closed hand without load, (6,); None if it cannot close."""

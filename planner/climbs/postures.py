@@ -292,14 +292,24 @@ class Postures:
                     return float(np.inf)
                 more -= wrench
             moments = self._in_air(air, held) if air else np.zeros((1, 3))
-            share = 0.0
+            share = self._share_halfway(held, own) if held.phase == "shift" else 0.0
             for moment in moments:
                 all_ = more + np.array([*np.zeros(3), *moment])
-                share = max(share, self._programs.share(held.state, loads, all_))
                 if not share <= self._settings.torque_share:
                     break
+                share = max(share, self._programs.share(held.state, loads, all_))
             self._shares[key] = share
         return self._shares[key]
+
+    def _share_halfway(self, held: HeldState, own: Mapping[Stay, tuple[int, int]]) -> float:
+        """Return the least share of joint torque limits halfway on the shift to a state."""
+        wrenches, body, loads = self._wall.screening.wrenches, held.state.body, {}
+        for hold, (way, part) in own.items():
+            _, at = self._ways.path(hold)
+            angles = self._ways.of(hold)[way][(at[part - 1] + at[part]) // 2]
+            loads[hold.limb] = self._programs.loads(hold.limb, hold.place, body, angles)
+            before = hold.bodies[part - 1]
+        return self._programs.share(held.state, loads, 0.5 * (wrenches[before] - wrenches[body]))
 
     @staticmethod
     def _key(holds: Sequence[Stay], held: HeldState, chosen: Sequence[int]) -> tuple[object, ...]:
