@@ -73,17 +73,17 @@ class Sought(NamedTuple):
 
 
 def demo_request() -> requests.ClimbRequest:
-    """Return the request for a climb of several moves on a bundled wall."""
+    """Return the request for a climb on the bundled small wall."""
     return requests.ClimbRequest(
         v=1,
-        name="knob-wall",
-        rock="knob-wall",
-        start=requests.ClimbEnd(height=0.86),
-        goal=requests.ClimbEnd(height=1.235),
-        places=PlaceGrid(spacing=0.2),
-        bodies=BodyGrid(spacing=0.2, margin=0.65, stand_offs=(0.6, 0.7)),
+        name="small-wall",
+        rock="small-wall",
+        start=requests.ClimbEnd(height=0.75),
+        goal=requests.ClimbEnd(height=1.0),
+        places=PlaceGrid(spacing=0.18),
+        bodies=BodyGrid(stand_offs=(0.6, 0.7)),
         best_within=0.3,
-        time=400.0,
+        time=240.0,
     )
 
 
