@@ -233,22 +233,19 @@ def _raised(t: float, own: float, least: float) -> float:
 
 
 @compiled()
-def _raised_between(t: float, part: float, own: Array, least: Array) -> float:
+def _raised_between(t: float, part: float, own: Array, least: Array, even: float) -> float:
     """Return t raised as the plane's rock at two places beside it is, at a part of the way between.
 
     It is as far from the envelope's chord as from its own rock's, in proportion less where that is
-    steeper; but it stands out of both places, or lies behind both, by no more than there. Where the
-    plane's rock ends it is raised to the chord at most.
+    steeper, or falls where the envelope rises; ``even`` is the step between places up to which rock
+    is not steep. Between places this is affine: corners on a straight piece change nothing. It is
+    never raised behind its own rock. Where the plane's rock ends it is raised to the chord at most.
     """
-    chord = least[0] + part * (least[1] - least[0])
-    low, high = min(own[0], own[1]), max(own[0], own[1])
-    if high == math.inf:
+    step, chord = own[1] - own[0], least[0] + part * (least[1] - least[0])
+    if max(own[0], own[1]) == math.inf:
         return float(min(t, chord))
-    first, last, inside = min(least[0], least[1]), max(least[0], least[1]), min(max(t, low), high)
-    off = inside - (own[0] + part * (own[1] - own[0]))
-    if high - low > last - first:
-        off *= (last - first) / (high - low)
-    return float(min(max(chord + off, first), last) + (t - inside))
+    like = ((least[1] - least[0]) * step + even * even) / (step * step + even * even)
+    return float(min(chord + min(max(like, 0.0), 1.0) * (t - (own[0] + part * step)), t))
 
 
 @compiled("f2", "f1", "f1", "f1", "f3", "f0", "f0")
@@ -291,7 +288,8 @@ def raised_outlines(
             corner += 1
             if rock and not alone:
                 part = (here - s[i - 1]) / (s[i] - s[i - 1])
-                raised = _raised_between(t, part, own[i - 1 : i + 1], least[i - 1 : i + 1])
+                sides = slice(i - 1, i + 1)
+                raised = _raised_between(t, part, own[sides], least[sides], s[i] - s[i - 1])
                 found[total, 0], found[total, 1] = here, raised
                 total += 1
                 continue

@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from service.commands.cli import run_command_line
-from tests.suite.helpers.commands import BAD_INPUT, DONE, complaint, result
+from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED, complaint, result
 from tests.suite.helpers.replies import refusal
 from tests.suite.helpers.requests import put, wall_request
 from tests.suite.helpers.scans import relief, wall, write_cloud
@@ -198,7 +198,7 @@ def test_a_scan_that_is_a_sieve_is_told_to_be_one(tmp_path, capfd):
     told = re.search(r"warning: (\d+) holes .*: with --hole ([\d.]+), (\d+) holes .* left", said)
     assert told is not None
     looked = ["holds", str(rock), "-o", str(tmp_path / "h.json"), "--spacing", "0.3"]
-    assert run_command_line([*looked, "--workers", "1"]) == DONE
+    assert run_command_line([*looked, "--workers", "1"]) == OVERLOADED
     said = " ".join(capfd.readouterr().out.split())
     assert "nothing holds: is the scan full of holes? `crux rock` says what helps" in said
     assert run_command_line([*asked, "--hole", told[2], "--json"]) == DONE
