@@ -14,7 +14,6 @@ import pytest
 from hand_models import Cylinder, InvalidInputError, Mesh, SpinyHand, spiny_hand
 from hand_models.hand import FINGERS
 from hand_models.parameters import ParameterTable, Quantity, hand_table, load_own_hand, own_hand
-from hand_models.rock import Profile
 from planner.robots import robosimian
 from service.answering import dispatch, read_hand, with_hand
 from service.answering.questions import question
@@ -316,12 +315,10 @@ def test_tiles_wider_than_frames_are_refused_wherever_a_hand_is_read(tmp_path: P
     narrow = own("finger", "frame_width", 0.02)
     path = tmp_path / "narrow.toml"
     path.write_text(entry_toml("finger", "frame_width", 0.02))
-    line = [[-0.1, 0.01], [0.0, 0.0], [0.1, 0.01]]
     readers: list[Callable[[], object]] = [
         lambda: load_own_hand(path),
         lambda: own_hand(narrow),
         lambda: SpinyHand(hand_table().replaced(narrow)),
-        lambda: Profile(line, hand_table().replaced(narrow)),
     ]
     for reads in readers:
         with pytest.raises(InvalidInputError, match="lower it, or raise frame_width") as caught:
