@@ -14,7 +14,7 @@ Benders' cuts, 1962).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -156,17 +156,16 @@ class CombinationSearch:
         """
         as_it_is = Choice(tuple(int(slot[self.sizes[slot].argmin()]) for slot in self.slots), 0)
         seen, forbidden = [as_it_is], 0
+        earlier: dict[Choice, float] = {}  # choices and what they were worth
         while len(self.gives) and self.trials.left > last:
-            choices = set()
+            choices = {}
             for start in {as_it_is, seen[-1], *self.anywhere()}:
                 deadline.check(SETTINGS.late)
-                choices.add(self._climbed(start, smallest))
-            enough = 0.97  # of what is needed: with less no plan is made
-            new = [
-                (worth, choice)
-                for worth, choice in choices
-                if choice not in seen and self.part(choice) >= enough
-            ]
+                worth, choice = self._climbed(start, smallest)
+                choices[choice] = worth
+            earlier |= choices
+            # what an earlier search came to only once this one comes to nothing new
+            new = self._enough(choices, seen) or self._enough(earlier, seen)
             if not new:
                 return None
             _, choice = max(new)
@@ -190,6 +189,17 @@ class CombinationSearch:
         for _ in range(8):  # random choices to begin at
             hands = tuple(int(self._random.choice(slot)) for slot in self.slots)
             yield Choice(hands, int(self._random.integers(len(self._shifts))))
+
+    def _enough(
+        self, worths: Mapping[Choice, float], seen: Sequence[Choice]
+    ) -> list[tuple[float, Choice]]:
+        """Return the choices that are not yet seen and give nearly enough, with their worth."""
+        enough = 0.97  # of what is needed: with less no plan is made
+        return [
+            (worth, choice)
+            for choice, worth in worths.items()
+            if choice not in seen and self.part(choice) >= enough
+        ]
 
     def part(self, choice: Choice) -> float:
         """Return the share of the needed wrench that a choice can exert, in the worst direction.
