@@ -292,9 +292,9 @@ def _increment(
     more = min(more, max(forced, settings.least_tension * drive.closing))
     # where a gap may grow, its least is to be that of the path, not of an increment beside it
     beside = size > settings.path_turn and opens and not air
-    unstable = _curved(move, now.stiffness) or _curved(grow, now.stiffness)
-    if unstable and state.damping > 0.0 and size > settings.damped_turn:
-        # what has lost its stability is to leave at this tension, and is only pushed off
+    if state.damping > 0.0:
+        # what has lost its stability is to leave at this tension, and is only pushed off; damped
+        # joints lag behind their balance, and may end on the other side of one they leave
         more = min(more, settings.least_tension * drive.closing)
     if drive.lowers == 1:
         # from balance to balance

@@ -31,9 +31,10 @@ FEW = {63: 49, 75: 29, 106: 23, 192: 3}
 """Seeds of hands, and places at which a tile comes within its spines' travel: it once bore its
 whole joint from its first spine on."""
 
-BALANCED = {87: 41, 94: 2, 199: 47}
+BALANCED = {87: 41, 94: 2, 185: 26, 199: 47}
 """Seeds of hands, and places at which the tension once grew while joints were leaving a state that
-had lost its stability, so that spines held at a gap that depended on the increments."""
+had lost its stability, so that spines held at a gap, or a finger ended in a balance, that depended
+on the increments."""
 
 RINGS = {113: 12, 173: 36}
 """Seeds of hands, and places at which rock jumped whose outline, a ring, was seen as if it ended
@@ -42,7 +43,7 @@ where its first triangle was cut."""
 STEP = 0.01
 """Of a support at a micrometre, at most, in parts of its scale."""
 
-STEEP = 0.05
+STEEP = 0.03
 """Share of hands, at most, that have a larger step: a tile is pulled off, or a finger snaps, at a
 tension that a micrometre moves past the closing tension or a strength; a bare phalanx leaves the
 rock; or a support changes as fast all the way.
