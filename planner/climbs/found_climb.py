@@ -55,15 +55,19 @@ class FoundClimb:
 
     @property
     def gap(self) -> float | None:
-        """Part by which another climb's least load factor may be larger; None without a climb."""
-        return self.bound / self.least - 1.0 if self.least else None
+        """Part by which another climb's least load factor may be larger; None without a climb.
+
+        None is larger where the plans of the stages hold as much as the bound, or more: they know
+        the posture's centre of mass.
+        """
+        return max(self.bound / self.least - 1.0, 0.0) if self.least else None
 
     @property
     def about(self) -> str:
         """Sentence that says what the bound is about."""
         wall = self.wall
         return (
-            f"the bound is about {len(wall.places)} placements and {len(wall.bodies)} poses of the "
-            "body, hands with fixed wrists and joints as the reach table has them (what inverse "
-            "kinematics did not find is left out), without limits of joint torques"
+            f"the bound is about the placements ({len(wall.places)}) and poses of the body "
+            f"({len(wall.bodies)}), hands with fixed wrists and joints as the reach table has them "
+            "(what inverse kinematics did not find is left out), without limits of joint torques"
         )

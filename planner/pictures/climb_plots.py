@@ -218,6 +218,7 @@ def _draw_factors(axes: Any, found: FoundClimb) -> None:
         said = {"none": "proven: there is no climb", "blocked": "no moves of a climb have a plan"}
         axes.text(0.5, 0.5, said.get(found.status, "no climb was found in time"), ha="center")
     axes.axhline(1.0, color="0.6", linewidth=0.8)
+    axes.xaxis.get_major_locator().set_params(integer=True)
     axes.set(xlabel="stage", ylabel="load factor [1]", title=found.status.replace("_", " "))
     axes.set_ylim(bottom=0.0)
     axes.grid(alpha=0.3)

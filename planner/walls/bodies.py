@@ -8,13 +8,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array, Indices, InvalidInputError, Pose, turns_about
+from hand_models.base import (
+    BASE_TOLERANCES,
+    Array,
+    Indices,
+    InvalidInputError,
+    Pose,
+    turns_about,
+)
 from hand_models.rock import Mesh
 from planner.motion import distances_from_rock
 from planner.robots import Robot
 from planner.walls.grids import BodyGrid
 
-__all__ = ["BodyPoses", "body_poses"]
+__all__ = ["BodyPoses", "body_poses", "equal_poses"]
 
 
 class BodyPoses(NamedTuple):
@@ -30,24 +37,32 @@ class BodyPoses(NamedTuple):
         Pairs between which the body may be shifted: neighbours on the grid.
     in_rock : int
         Number of poses that were left out as the body would touch the rock.
+    given : tuple of int
+        Indices of the poses that `with_more` was given.
     """
 
     poses: tuple[Pose, ...]
     cells: Indices
     shifts: Indices
     in_rock: int
+    given: tuple[int, ...] = ()
 
     def with_more(self, more: Sequence[Pose], near: float, turn: float) -> BodyPoses:
-        """Return the poses with further ones at the end, which may be shifted to those near them.
+        """Return the poses with further ones, which may be shifted to those near them.
 
         Parameters
         ----------
         more : sequence of Pose
-            Poses of B in W. They are not tried for rock.
+            Poses of B in W. They are not tried for rock. Those that are there already are named,
+            the others are put at the end.
         near, turn : float
             Distance, and turn, up to which the body may be shifted from one of them [m, rad].
         """
-        every = (*self.poses, *more)
+        every, given = list(self.poses), list[int]()
+        for pose in more:
+            (same,) = np.nonzero(equal_poses(every, pose))
+            given.append(int(same[0]) if len(same) else len(every))
+            every += [] if len(same) else [pose]
         places = np.array([pose.position for pose in every]).reshape(-1, 3)
         axes = np.array([pose.rotation for pose in every]).reshape(-1, 3, 3)
         pairs = list[Indices]()
@@ -57,8 +72,18 @@ class BodyPoses(NamedTuple):
             away = np.linalg.norm(places[:new] - places[new], axis=1)
             others = np.flatnonzero((away <= near) & (turned <= turn))
             pairs.append(np.column_stack([others, np.full(len(others), new)]))
-        cells = np.pad(self.cells, ((0, len(more)), (0, 0)), constant_values=-1)
-        return self._replace(poses=every, cells=cells, shifts=np.vstack([self.shifts, *pairs]))
+        cells = np.pad(self.cells, ((0, len(every) - len(self.poses)), (0, 0)), constant_values=-1)
+        shifts = np.vstack([self.shifts, *pairs])
+        return self._replace(poses=tuple(every), cells=cells, shifts=shifts, given=tuple(given))
+
+
+def equal_poses(poses: Sequence[Pose], other: Pose) -> NDArray[np.bool_]:
+    """Return which of P poses another one is, up to rounding, shape (P,)."""
+    places = np.array([pose.position for pose in poses]).reshape(-1, 3)
+    axes = np.array([pose.rotation for pose in poses]).reshape(-1, 3, 3)
+    near = np.linalg.norm(places - other.position, axis=1) <= BASE_TOLERANCES.length
+    turned = np.abs(axes - other.rotation).max(axis=(1, 2)) > BASE_TOLERANCES.angle
+    return np.asarray(near & ~turned)
 
 
 def body_poses(grid: BodyGrid, rock: Mesh, rock_pose: Pose, robot: Robot) -> BodyPoses:

@@ -16,8 +16,17 @@ from typing import Any, Protocol
 import msgspec
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, Pose, UnsupportedError, errors_under, go_on
+from hand_models.base import (
+    BASE_TOLERANCES,
+    Array,
+    InvalidInputError,
+    Pose,
+    UnsupportedError,
+    errors_under,
+    go_on,
+)
 from hand_models.fixed_wrist import REFUSAL_WORDS, HoldTrial, input_digests, wrench_space
+from hand_models.hand import Grasp
 from hand_models.rock import Mesh
 from hand_models.tile import Surface
 from planner import deadline
@@ -29,7 +38,7 @@ from planner.robots import Robot
 from planner.screening import HandParts
 from planner.search import Wall
 from planner.walls.assembly import assemble_wall
-from planner.walls.bodies import BodyPoses, body_poses
+from planner.walls.bodies import BodyPoses, body_poses, equal_poses
 from planner.walls.files import robot_digest
 from planner.walls.grids import BodyGrid, PlaceGrid
 from planner.walls.places import HandPlace, best_places, hand_at, place_trials
@@ -83,10 +92,11 @@ class WallSource:
     gravity : ndarray, shape (3,)
         Acceleration of gravity, in W [m/s²].
     more_places : sequence of HandOnHold
-        Placements that are added at the end, such as those of a given stance.
+        Further placements, such as those of a given stance. Those that the grid has, too, count
+        once; the others are put at the end.
     more_bodies : sequence of Pose
-        Poses of B in W that are added at the end. They may be shifted to those of the grid that are
-        nearer than one and a half of its spacings, and turned by `BodyGrid.turn` at most.
+        Further poses of B in W; likewise. The body may be shifted from them to those of the grid
+        that are nearer than one and a half of its spacings, and turned by `BodyGrid.turn` at most.
     together : int
         Points at which hands are closed together, and placements that are reached together, in one
         chunk.
@@ -164,6 +174,8 @@ class MadeWall:
         none, as workers died of them.
     in_rock : int
         Number of poses of the body that were left out as the body would touch the rock.
+    given : tuple of int
+        Indices of the placements that the source was given.
     seconds : dict of str to float
         Duration of each phase: ``placements``, ``reach`` and ``tables`` [s].
     """
@@ -174,6 +186,7 @@ class MadeWall:
     lost_trials: int
     lost_places: int
     in_rock: int
+    given: tuple[int, ...]
     seconds: dict[str, float]
 
 
@@ -220,9 +233,17 @@ def wall_of(
         found += places
         refused += others
     limb, rock = source.robot.limbs[0], (source.rock, source.rock_pose, source.surface)
-    hands, parts = _given_places(source)
-    hands = [hand_at(place, *rock, limb) for place in found] + hands
-    parts = [place.parts for place in found] + parts
+    hands = [hand_at(place, *rock, limb) for place in found]
+    parts, given = [place.parts for place in found], list[int]()
+    for hand, its_parts in _given_places(source):
+        same = equal_poses([each.pose for each in hands], hand.pose)
+        there = [
+            i for i in np.flatnonzero(same).tolist() if _closed_alike(hands[i].grasp, hand.grasp)
+        ]
+        given.append(there[0] if there else len(hands))
+        if not there:
+            hands.append(hand)
+            parts.append(its_parts)
     if not hands:
         tried = sum(map(len, points))
         counts = {REFUSAL_WORDS[kind]: count for kind, count in refused.most_common()}
@@ -257,6 +278,7 @@ def wall_of(
         lost_trials=lost_trials,
         lost_places=lost_places,
         in_rock=bodies.in_rock,
+        given=tuple(given),
         seconds={
             "placements": placed - started,
             "reach": reached - placed,
@@ -281,9 +303,15 @@ def _rows(poses: Sequence[Pose]) -> list[list[float]]:
     return [np.column_stack([each.rotation, each.position]).ravel().tolist() for each in poses]
 
 
-def _given_places(source: WallSource) -> tuple[list[HandOnHold], list[HandParts]]:
-    """Return given placements, closed, and their sets."""
-    hands, parts = list[HandOnHold](), list[HandParts]()
+def _closed_alike(one: Grasp, other: Grasp) -> bool:
+    """Return whether two grasps are the same, up to rounding."""
+    turn = other.outer_rotation
+    near = abs(one.outer_rotation - turn) <= BASE_TOLERANCES.angle
+    return near and msgspec.structs.replace(one, outer_rotation=turn) == other
+
+
+def _given_places(source: WallSource) -> Iterator[tuple[HandOnHold, HandParts]]:
+    """Yield given placements, closed, and their sets."""
     outcomes = settle_each(source.robot.hand, source.more_places)
     for i, (hand, outcome) in enumerate(zip(source.more_places, outcomes, strict=True)):
         if hand.wrist != "fixed":
@@ -298,13 +326,10 @@ def _given_places(source: WallSource) -> tuple[list[HandOnHold], list[HandParts]
                 field=f"more_places[{i}].pose",
             )
         at = outcome.seating.pose
-        hands.append(
-            replace(
-                hand, hold_pose=None, hold_in_hand=at, at=None, seat="rest", seat_direction=None
-            )
+        closed = replace(
+            hand, hold_pose=None, hold_in_hand=at, at=None, seat="rest", seat_direction=None
         )
-        parts.append(HandParts.of(wrench_space(outcome)))
-    return hands, parts
+        yield closed, HandParts.of(wrench_space(outcome))
 
 
 def _unknown(places: int, bodies: int, robot: Robot) -> ReachTable:

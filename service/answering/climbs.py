@@ -117,11 +117,10 @@ def seek_climb(
     )
     progress, bodies = _Progress(request.id, report), source.poses()
     origins = np.array([body.position for body in bodies.poses])
-    # stances have the last poses and placements, in the order of the ends
-    last = dict(zip(stances, range(-len(stances), 0), strict=True))
+    its_body = dict(zip(stances, bodies.given, strict=True))
     at = {
-        name: np.arange(len(origins)) == len(origins) + last[name]
-        if name in last
+        name: np.arange(len(origins)) == its_body[name]
+        if name in its_body
         else _bodies_near(name, end, origins)
         for name, end in ends.items()
     }
@@ -132,10 +131,8 @@ def seek_climb(
             made = make(source, progress.wall)
     except InvalidInputError as error:
         raise _named(error, list(given)) from None
-    count, limbs = len(made.wall.places), len(robot.limbs)
-    members = {
-        name: tuple(range(count + k * limbs, count + (k + 1) * limbs)) for name, k in last.items()
-    }
+    limbs = len(robot.limbs)
+    members = {name: made.given[k * limbs : (k + 1) * limbs] for k, name in enumerate(stances)}
     start, goal = (Ends(bodies=at[name], members=members.get(name)) for name in ends)
     left = deadline.left()
     # the rest of the time is for the changes that would raise the load factor, and for the reply

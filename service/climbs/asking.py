@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +12,7 @@ import msgspec
 
 from hand_models.base import InvalidInputError, errors_under
 from planner import BodyGrid, PlaceGrid
-from service import requests
+from service import requests, wire
 from service.climbs.rocks import rock_message
 
 __all__ = ["Sought", "climb_end", "demo_request"]
@@ -73,18 +74,9 @@ class Sought(NamedTuple):
 
 
 def demo_request() -> requests.ClimbRequest:
-    """Return the request for a climb on the bundled small wall."""
-    return requests.ClimbRequest(
-        v=1,
-        name="small-wall",
-        rock="small-wall",
-        start=requests.ClimbEnd(height=0.75),
-        goal=requests.ClimbEnd(height=1.0),
-        places=PlaceGrid(spacing=0.18),
-        bodies=BodyGrid(stand_offs=(0.6, 0.7)),
-        best_within=0.3,
-        time=240.0,
-    )
+    """Return the request for a climb on the bundled wall of large knobs."""
+    file = resources.files("service") / "examples" / "climbs" / "knob-wall.json"
+    return wire.decode_request(file.read_bytes(), requests.ClimbRequest)
 
 
 def climb_end(

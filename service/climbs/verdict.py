@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planner import FoundClimb, constraint_words
+from planner import FoundClimb
 from service.tables import counted
 
 if TYPE_CHECKING:
@@ -57,11 +57,8 @@ def _sentences(found: FoundClimb, at_least: float | None) -> Iterator[str]:
     if deciding is not None:
         what = " ".join(filter(None, (deciding.phase, deciding.limb)))
         where = ", ".join(f"{limb} at {place}" for limb, place in deciding.placements.items())
-        limit = (
-            ""
-            if deciding.limiting is None
-            else (f"; {deciding.limiting.limb}: {constraint_words(deciding.limiting)} is used most")
-        )
+        reason = found.result.plans[deciding.stage].reason if found.result else ""
+        limit = f"; {reason}" if reason else ""
         move = f"move {deciding.move}, " if deciding.move else ""
         yield f"stage {deciding.stage} decides ({move}{what}; {where}){limit}"
     for each in found.raises[:3]:

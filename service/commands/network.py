@@ -287,7 +287,7 @@ def play_command(
     flag_value="crux-climb",
     type=click.Path(path_type=Path, file_okay=False),
     metavar="[DIR]",
-    help="Search for a climb on the bundled small wall instead; where its files go.",
+    help="Search for a climb on the bundled knob-wall instead; where its files go.",
 )
 @options.own_options
 @options.json_option

@@ -6,6 +6,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from hand_models.base import (
     InvalidInputError,
@@ -15,6 +16,7 @@ from hand_models.base import (
     wrench_transport,
 )
 from hand_models.fixed_wrist import wrench_spaces
+from hand_models.hand import Grasp
 from hand_models.rock import Cylinder, Mesh
 from hand_models.scans import generate_wall
 from hand_models.tile import Surface
@@ -99,17 +101,25 @@ def test_what_stands_and_falls_with_the_wall_moves_with_it():
 
 def test_given_placements_and_bodies_come_last():
     source, made = tiny_source(), tiny_wall().wall
-    given = replace(made.places[3], pose=made.places[3].pose, limb="rear_left")
+    place = made.places[3]
+    # a micrometre beside its place on the rock
+    aside = np.array([0.0, 1e-6, 0.0])
+    pose = Pose(place.pose.position + aside, place.pose.rotation)
+    given = replace(
+        place, limb="rear_left", pose=pose, hold_pose=source.rock_pose, hold_in_hand=None
+    )
     body = Pose(made.bodies[0].position + np.array([0.0, 0.02, 0.0]), made.bodies[0].rotation)
     more = replace(source, more_places=[given], more_bodies=[body])
-    wall = wall_of(more, more.poses()).wall
-    assert len(wall.places) == len(made.places) + 1
+    poses = more.poses()
+    whole = wall_of(more, poses)
+    wall = whole.wall
+    assert (whole.given, poses.given) == ((len(made.places),), (len(made.bodies),))
     assert wall.places[-1].limb == "rear_left"
     np.testing.assert_array_equal(wall.bodies[-1].position, body.position)
-    # the same hand as before, from the same bodies
+    # about the same hand as before, from the same bodies
     np.testing.assert_array_equal(wall.reach.reached[-1, :-1], made.reach.reached[3])
     supports = wall.screening.hands.supports(DIRECTIONS)
-    np.testing.assert_allclose(supports[-1], supports[3], rtol=1e-12)
+    np.testing.assert_allclose(supports[-1], supports[3], rtol=1e-3)
     assert not wall.apart[-1, 3]
     assert any(pair.tolist() == [0, len(made.bodies)] for pair in wall.shifts)
     loose = replace(source, more_places=[replace(given, wrist="compliant")])
@@ -120,6 +130,25 @@ def test_given_placements_and_bodies_come_last():
     off = replace(source, more_places=[given, off_rock])
     with pytest.raises(InvalidInputError, match=r"more_places\[1\]\.pose: no tile is on the rock"):
         wall_of(off, off.poses())
+
+
+def test_what_the_grids_have_counts_once():
+    """As numbers of twelve digits give it, such as those of a file."""
+    source, made = tiny_source(), tiny_wall().wall
+    place, body = made.places[3], made.bodies[1]
+    turn = Rotation.from_matrix(place.pose.rotation).as_quat().round(12)
+    pose = Pose.from_quaternion(place.pose.position.round(12), turn)
+    about = replace(place, pose=pose, hold_pose=source.rock_pose, hold_in_hand=None)
+    grasp = Grasp(round(place.grasp.outer_rotation, 12))
+    other = Grasp(grasp.outer_rotation, closing_tension=30.0)
+    hands = [replace(about, grasp=each) for each in (grasp, other, grasp, other)]
+    more = replace(source, more_places=hands, more_bodies=[body, body])
+    poses = more.poses()
+    whole = wall_of(more, poses)
+    count = len(made.places)
+    assert (whole.given, len(whole.wall.places)) == ((3, count, 3, count), count + 1)
+    assert (poses.given, len(poses.poses)) == ((1, 1), len(made.bodies))
+    np.testing.assert_array_equal(poses.shifts, source.poses().shifts)
 
 
 def test_a_wall_is_read_as_it_was_written(tmp_path):

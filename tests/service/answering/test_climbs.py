@@ -52,6 +52,7 @@ def sought() -> SoughtClimb:
         lost_trials=0,
         lost_places=0,
         in_rock=0,
+        given=(),
         seconds={"placements": 1.0},
     )
     return SoughtClimb(found, made, places[0].hold, Pose.identity(), start, goal)

@@ -146,7 +146,12 @@ def test_a_move_of_no_limb_is_told_without_one(capsys):
     [
         (0, 1, 0, ("no moves of limbs, 1 knot, 0 s long", "stage 0 decides (start; rear at 3)")),
         (1, 2, 1, ("1 move of a limb, 2 knots, 4 s long", "decides (move 1, start; rear at 3)")),
-        (2, 3, 2, ("2 moves of limbs, 3 knots, 8 s long", "decides (move 2, start; rear at 3)")),
+        (
+            2,
+            3,
+            2,
+            ("2 moves of limbs, 3 knots, 8 s long", "start; rear at 3); rear: the palm"),
+        ),
     ],
 )
 def test_none_and_one_read_well(moves, knots, move, said, capsys):
@@ -171,6 +176,7 @@ def test_none_and_one_read_well(moves, knots, move, said, capsys):
             knots=[SimpleNamespace(time=4.0 * i) for i in range(knots)],
         ),
         deciding=deciding,
+        result=SimpleNamespace(plans=[SimpleNamespace(reason="rear: the palm slips")]),
         raises=(),
         about="",
         refused=(),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hand_models.scans import generate_wall
-from planner import ClimbCertificate, check_bound
+from planner import ClimbCertificate, check_bound, robosimian
 from service.bulk import read_trajectory
 from service.commands.cli import run_command_line
 from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED
@@ -86,11 +86,20 @@ def test_the_demonstration_climbs_and_its_route_is_planned_again(tmp_path, capsy
     folder = tmp_path / "out"
     assert run_command_line(["demo", "--climb", str(folder), "--json"]) == 0
     reply = json.loads(capsys.readouterr().out)
-    assert reply["status"] in ("found", "not_proven")
-    assert 1.0 <= reply["least"] <= reply["bound"]
+    assert reply["status"] == "found"
+    assert 1.0 <= reply["least"] <= 1.05 * reply["bound"]
+    # its first stage is given: none of another climb can hold more than its linear program says
+    assert reply["deciding"]["stage"] == 0
+    assert reply["bound"] <= 1.05 * reply["least"]
+    moves = reply["route"]["moves"]
+    assert len(moves) >= 6
+    assert {move["limb"] for move in moves} == set(robosimian().limbs)
+    # placements and poses of its ends are those of the grid
+    assert check_bound(ClimbCertificate.read(folder / "certificate.npz")).proven
     for path in reply["files"].values():
         assert (tmp_path / path).exists()
     knots = read_trajectory(folder)
+    assert len(knots) > 100
     assert all(knot.verified for knot in knots)
     again = tmp_path / "again"
     assert run_command_line(["route", str(folder / "route.json"), "-o", str(again), "--json"]) == 0
