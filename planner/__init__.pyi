@@ -42,6 +42,10 @@ from .diagnosis import (
 from .explanation import (
     constraint_words as constraint_words,
 )
+from .pages import (
+    write_plan_page as write_plan_page,
+    write_route_page as write_route_page,
+)
 from .pictures import (
     plot_body_space as plot_body_space,
     plot_com_region as plot_com_region,

@@ -219,7 +219,7 @@ def view_directions(stance: Stance) -> ViewDirections:
     return ViewDirections(ahead, into, chosen == 0, bool(abs(into @ WORLD_UP) >= 0.9))
 
 
-def drawn_scene(plan: Plan, question: Question) -> DrawnScene:
+def drawn_scene(plan: Plan, question: Question, fineness: int = 10) -> DrawnScene:
     """Return all visible parts of a plan, in W.
 
     Parameters
@@ -228,10 +228,12 @@ def drawn_scene(plan: Plan, question: Question) -> DrawnScene:
         Any status; without loads there are no arrows of hands.
     question : Question
         Question that the plan answers.
+    fineness : int, optional
+        Number of points in half the outline of a capsule's end.
     """
     stance = question.stance
     settled = [settle_hand(hand, stance) for hand in stance.hands]
-    surfaces = _body(plan, stance)
+    surfaces = _body(plan, stance, fineness)
     lines: list[Line] = []
     dots: list[Dots] = []
     for hand, known, rock in zip(stance.hands, settled, _rocks(stance.hands, settled), strict=True):
@@ -326,7 +328,7 @@ def _rocks(hands: Sequence[HandOnHold], settled: Sequence[SettledHand]) -> list[
     return rocks
 
 
-def _body(plan: Plan, stance: Stance) -> list[DrawnSurface]:
+def _body(plan: Plan, stance: Stance, fineness: int) -> list[DrawnSurface]:
     """Return the capsules of what no joint moves, and of links where the joints are known.
 
     Of a robot whose file has no capsules of its body, all triangles of B and the first joints.
@@ -339,7 +341,7 @@ def _body(plan: Plan, stance: Stance) -> list[DrawnSurface]:
         kinds += ["link"] * (len(ends) - len(kinds))
     placed = stance.body.apply(ends.reshape(-1, 3)).reshape(-1, 2, 3)
     found = [
-        DrawnSurface(kind, "", *_capsule(start, end, radius))
+        DrawnSurface(kind, "", *_capsule(start, end, radius, fineness))
         for kind, (start, end), radius in zip(kinds, placed, radii.tolist(), strict=True)
     ]
     if "body" not in kinds:
@@ -352,13 +354,12 @@ def _body(plan: Plan, stance: Stance) -> list[DrawnSurface]:
     return found
 
 
-def _capsule(start: Array, end: Array, radius: float) -> Triangles:
-    """Return a capsule's surface [m]."""
+def _capsule(start: Array, end: Array, radius: float, count: int) -> Triangles:
+    """Return a capsule's surface [m], of so many points in half the outline of an end."""
     length = float(np.linalg.norm(end - start))
     along = (end - start) / length if length else WORLD_UP
     aside = np.linalg.svd(along[None])[2][1]
     across = np.array([aside, np.cross(along, aside)])
-    count = 10  # points of half the outline of an end
     turn, rise = np.linspace(0.0, 2.0 * np.pi, 2 * count + 1), np.linspace(0.0, np.pi / 2.0, count)
     around = np.column_stack([np.cos(turn), np.sin(turn)]) @ across
     half = np.sin(rise)[:, None, None] * around, np.cos(rise)[:, None, None] * along

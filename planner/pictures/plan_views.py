@@ -21,8 +21,8 @@ from planner.pictures.settings import PICTURE_SETTINGS
 __all__ = ["UTILISATION_COLOURS", "UTILISATION_NORM", "View", "draw_scene", "silhouette"]
 
 UTILISATION_COLOURS: Final = LinearSegmentedColormap.from_list(
-    "load", ["#1a9850", "#e6a117", "#d73027"]
-).with_extremes(over="#7b1fa2")
+    "load", PICTURE_SETTINGS.utilisation
+).with_extremes(over=PICTURE_SETTINGS.overload)
 """Colour map of utilisations from 0 to 1, with a separate colour above 1."""
 
 UTILISATION_NORM: Final = Normalize(0.0, 1.0)

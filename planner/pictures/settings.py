@@ -19,6 +19,9 @@ class PictureSettings:
     palm: str = "tab:brown"
     limb: str = "#4a6a8a"
     load: str = "tab:blue"
+    utilisation: tuple[str, ...] = ("#1a9850", "#e6a117", "#d73027")
+    overload: str = "#7b1fa2"
+    """Colours of utilisations, evenly spaced from 0 to 1, and of those above 1."""
     longest_force: float = 32.0
     """Length of the arrow of the largest tile force [mm]."""
     note_padding: float = 1.0

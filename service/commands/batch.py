@@ -11,7 +11,7 @@ from functools import partial
 from itertools import islice
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -20,7 +20,21 @@ from hand_models.base import CruxError, InvalidInputError
 from service import bulk, processes, tables, wire
 from service.commands import options
 
-__all__ = ["answer_rest", "batch_command", "complain", "exit_status", "new_run", "writing_answers"]
+if TYPE_CHECKING:
+    from service.climbs import Listing
+
+__all__ = [
+    "LISTED_ENDINGS",
+    "answer_rest",
+    "batch_command",
+    "complain",
+    "exit_status",
+    "is_listed",
+    "new_run",
+    "writing_answers",
+]
+
+LISTED_ENDINGS: Final = ".jsonl or .csv or .parquet"
 
 
 @click.command("batch")
@@ -357,3 +371,29 @@ def _print(tally: bulk.Tally, before: int, elapsed: float, file: Path | None) ->
     out.print(f"{done} requests in {elapsed:.1f} s, {rate:.0f} a second{known}", markup=False)
     if file is not None:
         out.print(f"written: {file}", markup=False, soft_wrap=True)
+
+
+def is_listed(output: Path, listing: Listing, several: bool, resume: bool) -> bool:
+    """Return whether the output is a file of many results, not the folder of one.
+
+    Parameters
+    ----------
+    output : Path
+    listing : Listing
+    several, resume : bool
+        Whether there are several; whether their run goes on where it was broken off.
+    """
+    if output.suffix.lower() in {".jsonl", ".csv", ".parquet"}:
+        return True
+    if several:
+        raise InvalidInputError(
+            f"{output}: many {listing.noun} need a file that ends in {LISTED_ENDINGS}", field="-o"
+        )
+    if resume:
+        raise InvalidInputError(f"requires -o FILE that ends in {LISTED_ENDINGS}", field="--resume")
+    ends_so = output.suffix.lower() in (".json", *options.PICTURE_ENDINGS)
+    if not output.is_dir() and (output.exists() or ends_so):
+        raise InvalidInputError(
+            f"{output}: must be a folder, or end in {LISTED_ENDINGS}", field="-o"
+        )
+    return False

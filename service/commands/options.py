@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
@@ -13,7 +13,7 @@ import msgspec
 from click.shell_completion import CompletionItem
 
 import planner
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, installed_version, to_install
 from service import answering, bulk, processes, requests, serving
 from service.commands import stances
 
@@ -28,12 +28,12 @@ __all__ = [
     "Wanted",
     "WorkersOption",
     "asked_for",
-    "beginning_so",
     "folder_option",
     "hand_option",
     "json_option",
     "limb_option",
     "own_options",
+    "page_option",
     "plot_option",
     "robot_option",
     "routes_argument",
@@ -201,9 +201,8 @@ class Wanted(NamedTuple):
         more: dict[str, Any] = {"draws": self.draws} if self.draws else {}
         if self.spread or self.draws:
             more["want"] = list(dict.fromkeys([*request.want, "spread"]))
-        return msgspec.structs.replace(
-            request, **more, **({"explain": False} if self.unexplained else {})
-        )
+        more |= {"explain": False} if self.unexplained else {}
+        return msgspec.structs.replace(request, **more)
 
 
 def with_extras(
@@ -268,39 +267,42 @@ def _check_folder(_: click.Context, __: click.Parameter, path: Path) -> Path:
     return path
 
 
-def beginning_so(
-    names: Iterable[str], *, files: bool = False
-) -> Callable[[click.Context, click.Parameter, str], list[CompletionItem]]:
-    """Return the function that completes a name in the shell; with ``files``, a path, too."""
-
-    def complete(_: click.Context, __: click.Parameter, begun: str) -> list[CompletionItem]:
-        found = [CompletionItem(name) for name in names if name.startswith(begun)]
-        # if the file came last, click's function for bash would drop the names
-        return [CompletionItem(begun, type="file"), *found] if files else found
-
-    return complete
+def _check_page(_: click.Context, __: click.Parameter, path: Path | None) -> Path | None:
+    """Refuse a page, before any work is done, if the library that draws it is not installed."""
+    if path is not None and installed_version("plotly") is None:
+        message = f"needs plotly, which is not installed: {to_install('view')}"
+        raise InvalidInputError(message, field="--html")
+    return path
 
 
 def _limbs(context: click.Context, _: click.Parameter, begun: str) -> list[CompletionItem]:
     """Complete the limbs whose hands hold in the stance, if it is given and can be read."""
     # click has not yet parsed arguments before an option that lacks its value
     given = [context.params.get("stance"), *context.args]
-    return beginning_so(stances.limbs_of(next(filter(None, given), None)), files=True)(
+    return stances.beginning_so(stances.limbs_of(next(filter(None, given), None)), files=True)(
         context, _, begun
     )
 
 
 stance_argument = click.argument(
-    "stance", shell_complete=beginning_so(stances.bundled(), files=True)
+    "stance", shell_complete=stances.beginning_so(stances.bundled(), files=True)
 )
 routes_argument = click.argument(
     "routes",
     nargs=-1,
     required=True,
     metavar="ROUTE...",
-    shell_complete=beginning_so(stances.bundled(requests.RouteRequest), files=True),
+    shell_complete=stances.beginning_so(stances.bundled(requests.RouteRequest), files=True),
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
+page_option = click.option(
+    "--html",
+    "page",
+    type=OutputFile(".html"),
+    callback=_check_page,
+    metavar="FILE",
+    help="Page for a browser to write: one file, which loads nothing else.",
+)
 hand_option = click.option(
     "--hand",
     type=click.Path(path_type=Path),
@@ -380,9 +382,8 @@ workers_options = asked_for(
 
 def plot_option(text: str) -> Callable[[Command], Command]:
     """Return the option ``--plot`` with a help text; the command gets the path as ``picture``."""
-    return click.option(
-        "--plot", "picture", type=OutputFile(*PICTURE_ENDINGS), metavar="FILE", help=text
-    )
+    kind = OutputFile(*PICTURE_ENDINGS)
+    return click.option("--plot", "picture", type=kind, metavar="FILE", help=text)
 
 
 def folder_option(text: str) -> Callable[[Command], Command]:

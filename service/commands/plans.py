@@ -22,6 +22,7 @@ __all__ = ["new_command", "plan_command", "redundancy_command"]
 @click.command("plan")
 @options.stance_argument
 @options.plot_option("Draw it there.")
+@options.page_option
 @click.option(
     "--robust",
     is_flag=True,
@@ -49,6 +50,7 @@ __all__ = ["new_command", "plan_command", "redundancy_command"]
 def plan_command(
     stance: str,
     picture: Path | None,
+    page: Path | None,
     robust: bool,
     open_loop: bool,
     clearance: bool,
@@ -101,6 +103,8 @@ def plan_command(
             started = None if request.deadline is None else begun
             with planner.deadline.within(request.deadline or seconds, started=started):
                 answer = _with_advice(answer, brief)
+    if page is not None:
+        tables.write_answer_page(answer, page, "a plan" if stance == "-" else Path(stance).stem)
     written: list[Path] = []
     if advice_folder is not None:
         assert isinstance(answer.reply, replies.PlanReply)  # of a whole request

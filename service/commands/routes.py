@@ -15,15 +15,12 @@ import msgspec
 import planner
 from hand_models.base import InvalidInputError, UnsupportedError, to_install
 from service import answering, bulk, climbs, requests, tables, wire
-from service.commands import options, stances
-from service.commands.batch import answer_rest, complain, exit_status, new_run
+from service.commands import batch, options, stances
 
 if TYPE_CHECKING:
     from hand_models.base import Array
 
 __all__ = ["climb_command", "route_command", "search_climb"]
-
-LISTED_ENDINGS: Final = ".jsonl or .csv or .parquet"
 
 
 @click.command("route")
@@ -34,7 +31,7 @@ LISTED_ENDINGS: Final = ".jsonl or .csv or .parquet"
     type=click.Path(path_type=Path),
     metavar="DIR",
     help="Where tables, stances, pictures and the trajectory of one route go; or of any number of "
-    f"routes a file that ends in {LISTED_ENDINGS}: the replies, one a line, or a table; with "
+    f"routes a file that ends in {batch.LISTED_ENDINGS}: the replies, one a line, or a table; with "
     "--stage a file that ends in .json: the stance.",
 )
 @click.option(
@@ -49,6 +46,7 @@ LISTED_ENDINGS: Final = ".jsonl or .csv or .parquet"
     is_flag=True,
     help="Go on where many routes were broken off: what the file answers is not asked again.",
 )
+@options.page_option
 @options.workers_options
 @options.spread_option
 @options.wanted_options
@@ -57,6 +55,7 @@ LISTED_ENDINGS: Final = ".jsonl or .csv or .parquet"
 def route_command(
     routes: tuple[str, ...],
     output: Path | None,
+    page: Path | None,
     index: int | None,
     resume: bool,
     parallel: options.WorkersOption,
@@ -73,23 +72,31 @@ def route_command(
     The exit status of many routes is the worst that one of them has, as for crux batch.
     """
     if index is not None:
-        return _stage(_Asked.of(routes, wanted, own), index, output, own, as_json)
-    if output is None:
-        raise InvalidInputError("missing: give -o DIR, or --stage K of one route", field="-o")
+        return _stage(_Asked.of(routes, wanted, own), index, output, page, own, as_json)
+    if output is None and page is None:
+        raise InvalidInputError(
+            "missing: give -o DIR, or --html FILE or --stage K of one route", field="-o"
+        )
     listing = climbs.route_listing()
-    if _is_listed(output, listing, len(routes) > 1 or _is_folder(routes[0]), resume):
-        for option, asked_for in (("--spread", wanted.spread), ("--draws", wanted.draws)):
+    several = len(routes) > 1 or stances.is_folder(routes[0])
+    if output is None and (several or resume):
+        raise InvalidInputError("is for one route, planned at once", field="--html")
+    if output is not None and batch.is_listed(output, listing, several, resume):
+        one = {"--spread": wanted.spread, "--draws": wanted.draws, "--html": page}
+        for option, asked_for in one.items():
             if asked_for:
                 raise InvalidInputError(
                     f"is for one route, whose output -o is a folder, got {output}", field=option
                 )
-        names = [name for source in routes for name in _files(source)]
+        names = [name for source in routes for name in stances.routes_of(source)]
         sources = climbs.Sources(names, lambda name: own.asked(stances.read_route(name)))
         unexplained = wanted.unexplained
         return _many(listing, sources, output, resume, parallel, own, as_json, unexplained)
     if parallel.dask is not None:
-        raise InvalidInputError(f"requires -o FILE that ends in {LISTED_ENDINGS}", field="--dask")
-    return _one(_Asked.of(routes, wanted, own), output, parallel.workers, own, as_json)
+        raise InvalidInputError(
+            f"requires -o FILE that ends in {batch.LISTED_ENDINGS}", field="--dask"
+        )
+    return _one(_Asked.of(routes, wanted, own), output, page, parallel.workers, own, as_json)
 
 
 def _above(name: str, text: str, most: float = 1e3, **more: Any) -> Any:
@@ -140,8 +147,8 @@ sought_options = options.asked_for(
     type=click.Path(path_type=Path),
     metavar="DIR",
     help="Where route, trajectory, stances, pictures, tables and the proof of one rock go; or of "
-    f"any number of rocks a file that ends in {LISTED_ENDINGS}: the replies, one a line, or a "
-    "table.",
+    f"any number of rocks a file that ends in {batch.LISTED_ENDINGS}: the replies, one a line, or "
+    "a table.",
 )
 @click.option(
     "--resume",
@@ -170,7 +177,7 @@ def climb_command(
     none was found in time; of many rocks the worst that one of them has, as for crux batch.
     """
     listing = climbs.climb_listing()
-    listed = _is_listed(output, listing, len(rocks) > 1, resume)
+    listed = batch.is_listed(output, listing, len(rocks) > 1, resume)
     with climbs.naming_options():
         asking = sought.asking(stances.read_request)
     sources = climbs.Sources(rocks, lambda rock: own.asked(asking(Path(rock))))
@@ -238,23 +245,32 @@ class _Asked(NamedTuple):
 
 def _one(
     asked: _Asked,
-    folder: Path,
+    folder: Path | None,
+    page: Path | None,
     workers: int | None,
     own: options.Own,
     as_json: bool,
 ) -> int:
-    """Evaluate one route, and write its report."""
+    """Evaluate one route, and write its report, its page or both."""
     route = answering.route_of(asked.request, own.robots)
-    with tables.filling_folder():
-        folder.mkdir(parents=True, exist_ok=True)
-    tables.write_alone(folder / "route", folder)
+    if folder is not None:
+        with tables.filling_folder():
+            folder.mkdir(parents=True, exist_ok=True)
+        tables.write_alone(folder / "route", folder)
     with tables.progress(f"planning the moves of {route.name}") as report:
         climb, lacks = _climb(route, report)
     with tables.progress(f"planning {route.name}") as report:
         result = planner.evaluate(route, workers, report, climb)
     _say_lacking(lacks)
-    with tables.filling_folder():
-        files, digest = climbs.write_route(result, climb, folder, asked.stage)
+    files: dict[str, Path] = {}
+    digest = None
+    if folder is not None:
+        with tables.filling_folder():
+            files, digest = climbs.write_route(result, climb, folder, asked.stage)
+    if page is not None:
+        with tables.writing(page, "--html"):
+            planner.write_route_page(result, page)
+        files["page"] = page
     if as_json:
         tables.say(
             planner.summary(result, climb, digest)
@@ -285,8 +301,15 @@ def _say_lacking(error: UnsupportedError | None) -> None:
         tables.remark(f"no trajectory: {error}")
 
 
-def _stage(asked: _Asked, index: int, file: Path | None, own: options.Own, as_json: bool) -> int:
-    """Print the plan of one stage, and write its stance."""
+def _stage(
+    asked: _Asked,
+    index: int,
+    file: Path | None,
+    page: Path | None,
+    own: options.Own,
+    as_json: bool,
+) -> int:
+    """Print the plan of one stage, and write its stance and its page."""
     if file is not None and file.suffix.lower() != ".json":
         raise InvalidInputError(f"{file}: must end in .json with --stage", field="-o")
     route = answering.route_of(asked.request, own.robots)
@@ -306,44 +329,9 @@ def _stage(asked: _Asked, index: int, file: Path | None, own: options.Own, as_js
     if file is not None:
         with tables.writing(file):
             climbs.write_stance(asked.stage(stage, joints or answer.plan.joints, file.parent), file)
+    if page is not None:
+        tables.write_answer_page(answer, page, f"{route.name}, stage {index}")
     return tables.show(answer.reply, as_json)
-
-
-def _is_folder(source: str) -> bool:
-    """Return whether a folder is meant, not a bundled route whose name a folder has, too."""
-    return Path(source).is_dir() and source not in stances.bundled(requests.RouteRequest)
-
-
-def _files(source: str) -> list[str]:
-    """Return the routes of a folder in the order of their names, or the one that is meant."""
-    if source == "-":
-        raise InvalidInputError(
-            "standard input is one route: give it alone, with -o DIR", field="ROUTE"
-        )
-    if not _is_folder(source):
-        return [source]
-    found = sorted(str(path) for path in Path(source).glob("*.json"))
-    if not found:
-        raise InvalidInputError(f"{source}: no file in this folder ends in .json", field="ROUTE")
-    return found
-
-
-def _is_listed(output: Path, listing: climbs.Listing, several: bool, resume: bool) -> bool:
-    """Return whether the output is a file of many results, not the folder of one."""
-    if output.suffix.lower() in {".jsonl", ".csv", ".parquet"}:
-        return True
-    if several:
-        raise InvalidInputError(
-            f"{output}: many {listing.noun} need a file that ends in {LISTED_ENDINGS}", field="-o"
-        )
-    if resume:
-        raise InvalidInputError(f"requires -o FILE that ends in {LISTED_ENDINGS}", field="--resume")
-    ends_so = output.suffix.lower() in (".json", *options.PICTURE_ENDINGS)
-    if not output.is_dir() and (output.exists() or ends_so):
-        raise InvalidInputError(
-            f"{output}: must be a folder, or end in {LISTED_ENDINGS}", field="-o"
-        )
-    return False
 
 
 def _many(
@@ -368,7 +356,7 @@ def _many(
         raise InvalidInputError(
             f"{file}: must be a file, not a device or pipe; name another", field="-o"
         )
-    sink = new_run(
+    sink = batch.new_run(
         file, sources, lambda: listing.columns, own, explained=not unexplained, resume=resume
     )
     before = sink.tally.count
@@ -386,12 +374,12 @@ def _many(
     def answers(asked: Iterator[bulk.Question]) -> Generator[wire.Answer, None, None]:
         return listing.answers(answer(asked))
 
-    answer_rest(sources, answers, sink, file, listing.work, listing.noun)
+    batch.answer_rest(sources, answers, sink, file, listing.work, listing.noun)
     elapsed = perf_counter() - begun
-    complain(sink.tally, sources.names.__getitem__, listing.noun)
+    batch.complain(sink.tally, sources.names.__getitem__, listing.noun)
     if as_json:
         counts = {"statuses": dict(sink.tally.statuses), "errors": dict(sink.tally.kinds)}
         tables.say({"v": 1, listing.noun: sources.count, **counts, "file": str(file)})
     else:
         listing.print(file, sources.names, before, elapsed)
-    return exit_status(sink.tally)
+    return batch.exit_status(sink.tally)

@@ -9,21 +9,25 @@ from __future__ import annotations
 import sys
 import tomllib
 from codecs import BOM_UTF8
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
+import click
 import msgspec
+from click.shell_completion import CompletionItem
 
 from hand_models.base import InvalidInputError
 from service import answering, bulk, requests, wire
 
 __all__ = [
     "Given",
+    "beginning_so",
     "bundled",
+    "is_folder",
     "limbs_of",
     "read_candidates",
     "read_request",
@@ -31,6 +35,7 @@ __all__ = [
     "read_route_with_text",
     "read_stance_or_route",
     "read_with_text",
+    "routes_of",
 ]
 
 RequestT = TypeVar("RequestT", bound=requests.Request)
@@ -213,6 +218,25 @@ def read_candidates(source: str) -> Iterator[tuple[str, requests.PlanRequest | I
         )
 
 
+def is_folder(source: str) -> bool:
+    """Return whether a folder is meant, not a bundled route whose name a folder has, too."""
+    return Path(source).is_dir() and source not in bundled(requests.RouteRequest)
+
+
+def routes_of(source: str) -> list[str]:
+    """Return the routes of a folder in the order of their names, or the one that is meant."""
+    if source == "-":
+        raise InvalidInputError(
+            "standard input is one route: give it alone, with -o DIR", field="ROUTE"
+        )
+    if not is_folder(source):
+        return [source]
+    found = sorted(str(path) for path in Path(source).glob("*.json"))
+    if not found:
+        raise InvalidInputError(f"{source}: no file in this folder ends in .json", field="ROUTE")
+    return found
+
+
 def _whole(line: bytes, files: answering.MeshFiles) -> requests.PlanRequest:
     return files.whole(wire.decode_request(line, requests.PlanRequest))
 
@@ -225,6 +249,19 @@ def _or_error(
         return read(*given)
     except InvalidInputError as error:
         return error
+
+
+def beginning_so(
+    names: Iterable[str], *, files: bool = False
+) -> Callable[[click.Context, click.Parameter, str], list[CompletionItem]]:
+    """Return the function that completes a name in the shell; with ``files``, a path, too."""
+
+    def complete(_: click.Context, __: click.Parameter, begun: str) -> list[CompletionItem]:
+        found = [CompletionItem(name) for name in names if name.startswith(begun)]
+        # if the file came last, click's function for bash would drop the names
+        return [CompletionItem(begun, type="file"), *found] if files else found
+
+    return complete
 
 
 def limbs_of(source: str | None) -> tuple[str, ...]:

@@ -85,7 +85,7 @@ def _measurements() -> studies.Study:
 
 
 @click.command("study", epilog=f"NAME is one of {', '.join(STUDY_NAMES)}.")
-@click.argument("name", shell_complete=options.beginning_so(STUDY_NAMES))
+@click.argument("name", shell_complete=stances.beginning_so(STUDY_NAMES))
 @options.folder_option("Where result.json and the pictures go.")
 @click.option(
     "--x",

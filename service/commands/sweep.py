@@ -145,7 +145,7 @@ def _status(result: sweeping.Sweep) -> int:
 @click.argument(
     "source",
     metavar="STANCE|ROUTE",
-    shell_complete=options.beginning_so(
+    shell_complete=stances.beginning_so(
         stances.bundled() + stances.bundled(requests.RouteRequest), files=True
     ),
 )

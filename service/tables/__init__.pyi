@@ -57,6 +57,7 @@ from .terminal import (
     tell_solver as tell_solver,
     waiting as waiting,
     working as working,
+    write_answer_page as write_answer_page,
     write_plan_picture as write_plan_picture,
     writing as writing,
 )

@@ -103,6 +103,22 @@ def write_plan_picture(answer: answering.Planned, picture: Path) -> None:
         planner.plot_plan(answer.plan, answer.question, picture)
 
 
+def write_answer_page(answer: answering.Planned, page: Path, title: str) -> None:
+    """Write the stance and the plan of an answer as a page; raise as `write_plan_picture`.
+
+    Parameters
+    ----------
+    answer : Planned
+        Question and plan.
+    page : Path
+        File of HTML to write.
+    title : str
+        Title of the page.
+    """
+    with writing(page, "--html"):
+        planner.write_plan_page(answer.plan, answer.question, page, title)
+
+
 @contextmanager
 def writing(path: Path, field: str = "--plot") -> Iterator[None]:
     """Convert errors of writing a file, within this context, into errors of one line.

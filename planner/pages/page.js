@@ -1,0 +1,297 @@
+"use strict";
+const byId = (name) => document.getElementById(name);
+const data = JSON.parse(byId("data").textContent);
+const shownKinds = { rock: true, robot: true, "forces of hands": true, "forces of tiles": false };
+let at = data.crux ?? 0, order = {};
+
+const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+const made = (tag, text, kind) => Object.assign(document.createElement(tag), { textContent: text ?? "", className: kind ?? "" });
+const words = (name) => name.replaceAll("_", " ");
+
+function bytesOf(text) { return Uint8Array.from(atob(text), (c) => c.charCodeAt(0)); }
+const unpacked = new Map();
+function numbers(index, kind) {
+  if (!unpacked.has(index)) unpacked.set(index, new kind(bytesOf(data.meshes[index]).buffer));
+  return unpacked.get(index);
+}
+
+function colourOf(used) { // as the still pictures have it: straight lines between the colours
+  if (used === null || used === undefined) return ink("load");
+  if (used > 1) return data.colours.overload;
+  const known = data.colours.utilisation, place = Math.max(used, 0) * (known.length - 1);
+  const i = Math.min(Math.floor(place), known.length - 2), part = place - i;
+  const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
+  const [low, high] = [rgb(known[i]), rgb(known[i + 1])];
+  return `rgb(${low.map((c, k) => Math.round(c + part * (high[k] - c))).join(",")})`;
+}
+
+// The scene ----------------------------------------------------------------------------------
+
+function meshOf(surfaces, more) { // many surfaces as one mesh, its text at each corner
+  const mesh = { type: "mesh3d", x: [], y: [], z: [], i: [], j: [], k: [], hoverinfo: "skip", ...more };
+  for (const surface of surfaces) {
+    const first = mesh.x.length;
+    const corners = numbers(surface.corners, Float32Array), triangles = numbers(surface.triangles, Uint16Array);
+    for (let n = 0; n < corners.length; n += 3) {
+      mesh.x.push(corners[n]); mesh.y.push(corners[n + 1]); mesh.z.push(corners[n + 2]);
+    }
+    for (let n = 0; n < triangles.length; n += 3) {
+      mesh.i.push(first + triangles[n]); mesh.j.push(first + triangles[n + 1]); mesh.k.push(first + triangles[n + 2]);
+    }
+  }
+  return mesh;
+}
+
+function linesOf(lines, more) { // polylines as one trace, with gaps
+  const trace = { type: "scatter3d", mode: "lines", x: [], y: [], z: [], hoverinfo: "skip", ...more };
+  for (const points of lines) {
+    for (const [x, y, z] of points) { trace.x.push(x); trace.y.push(y); trace.z.push(z); }
+    trace.x.push(null); trace.y.push(null); trace.z.push(null);
+  }
+  return trace;
+}
+
+function dotsOf(points, more) {
+  const [x, y, z] = [0, 1, 2].map((k) => points.map((p) => p[k]));
+  return { type: "scatter3d", mode: "markers", x, y, z, hoverinfo: "skip", ...more };
+}
+
+function tilesOf(tiles, visible) {
+  const corners = tiles.flatMap((t) => t.corners), [x, y, z] = [0, 1, 2].map((k) => corners.map((c) => c[k]));
+  const of = (a) => tiles.flatMap((_, n) => a.map((corner) => 4 * n + corner));
+  const colours = tiles.map((t) => colourOf(t.used));
+  const text = tiles.map((t) => `${words(t.limb)}, ${words(t.finger)}, ${t.phalanx}<br>utilisation ${t.used.toFixed(2)}<br>`
+    + `shear ${t.shear.toFixed(1)} N, normal ${t.normal.toFixed(1)} N, lateral ${t.lateral.toFixed(1)} N`);
+  return [
+    { type: "mesh3d", x, y, z, i: of([0, 0]), j: of([1, 2]), k: of([2, 3]), hoverinfo: "skip",
+      facecolor: colours.flatMap((c) => [c, c]), lighting: { ambient: 1, diffuse: 0 }, meta: "tiles" },
+    dotsOf(tiles.map((t) => t.start), { text, hovertemplate: "%{text}<extra></extra>",
+      marker: { size: 3, color: colours, line: { color: ink("ink"), width: 1 } } }),
+    linesOf(tiles.map((t) => [t.start, t.tip]), { meta: "forces of tiles", visible,
+      line: { width: 3, color: tiles.flatMap((t, n) => [colours[n], colours[n], colours[n]]) } }),
+  ];
+}
+
+function arrowsOf(arrows, visible) {
+  const more = { meta: "forces of hands", visible };
+  return arrows.flatMap((arrow) => {
+    const colour = colourOf(arrow.used), step = arrow.tip.map((t, k) => t - arrow.start[k]);
+    const size = Math.hypot(...step) || 1, head = Math.min(0.06, size), [u, v, w] = step.map((s) => s / size);
+    const text = `${arrow.text.replaceAll("\n", "<br>")}<br>[${arrow.force.map((f) => f.toFixed(0)).join(", ")}] N in W`
+      + (arrow.used === null ? "" : `<br>utilisation of the hand ${arrow.used.toFixed(2)}`);
+    const ends = arrow.tip.map((t, k) => [t, [u, v, w][k]]);
+    return [
+      linesOf([[arrow.start, arrow.tip]], { ...more, line: { width: 7, color: colour } }),
+      { type: "cone", ...Object.fromEntries(["x", "y", "z"].map((c, k) => [c, [ends[k][0]]])), u: [u], v: [v], w: [w], ...more,
+        anchor: "tip", sizemode: "raw", sizeref: head, showscale: false, hoverinfo: "skip",
+        colorscale: [[0, colour], [1, colour]] },
+      dotsOf([arrow.tip], { ...more, mode: "markers+text", text: [arrow.text.split("\n")[0]], hovertext: [text],
+        hovertemplate: "%{hovertext}<extra></extra>", marker: { size: 5, color: colour },
+        textposition: "top center", textfont: { color: ink("ink"), size: 12 } }),
+    ];
+  });
+}
+
+function sceneTraces(scene) {
+  const of = (kind) => scene.surfaces.filter((s) => s.kind === kind), flat = { flatshading: true };
+  const points = (kind) => scene.dots.filter((d) => d.kind === kind).flatMap((d) => d.points);
+  const robot = { meta: "robot", visible: shownKinds.robot }, joints = scene.dots.filter((d) => d.kind === "joint");
+  const lighting = { ambient: 0.8, diffuse: 0.4, specular: 0.05, roughness: 0.9 };
+  return [
+    meshOf(of("rock"), { meta: "rock", visible: shownKinds.rock, color: ink("rock"), opacity: 0.6, lighting, ...flat }),
+    meshOf(of("palm"), { color: ink("palm"), lighting: { ambient: 0.8 }, meta: "palms" }),
+    meshOf(of("body"), { ...robot, color: ink("body"), opacity: 0.5, lighting }),
+    meshOf(of("link"), { ...robot, color: ink("link"), opacity: 0.35, lighting }),
+    linesOf(scene.lines.filter((l) => l.kind === "limb").map((l) => l.points), { ...robot, line: { width: 6, color: ink("limb") } }),
+    linesOf(scene.lines.filter((l) => l.kind === "finger").map((l) => l.points), { line: { width: 4, color: ink("finger") } }),
+    dotsOf(joints.flatMap((d) => d.points), { ...robot, hovertemplate: "%{text}<extra></extra>",
+      text: joints.flatMap((d) => d.points.map((_, n) => `joint ${n + 1}` + (d.used ? `: utilisation ${d.used[n].toFixed(2)}` : ""))),
+      marker: { size: 4, color: joints.flatMap((d) => d.points.map((_, n) => d.used ? colourOf(d.used[n]) : ink("back"))),
+        line: { color: ink("limb"), width: 1 } } }),
+    dotsOf(scene.labels.map((l) => l.place), { mode: "text", text: scene.labels.map((l) => l.text), textposition: "bottom center",
+      textfont: { color: ink("ink"), size: 13 } }),
+    dotsOf(points("load"), { marker: { size: 6, color: ink("load") } }),
+    ...tilesOf(scene.tiles, shownKinds["forces of tiles"]),
+    ...arrowsOf(scene.arrows, shownKinds["forces of hands"]),
+  ];
+}
+
+const config = { displaylogo: false, responsive: true, displayModeBar: false };
+const axis = (title) => ({ title: { text: title }, color: ink("dim"), gridcolor: ink("line"), zerolinecolor: ink("line"),
+  backgroundcolor: ink("back"), showspikes: false });
+const vector = (v, length) => Object.fromEntries(["x", "y", "z"].map((c, k) => [c, length * v[k]]));
+function cameraOf(view) { // farther away in a narrow window
+  const { clientWidth, clientHeight } = byId("scene"), far = 1.7 * Math.max(1, 1.1 * clientHeight / clientWidth);
+  return { eye: vector(view.eye, far), up: vector(view.up, 1), center: vector([0, 0, 0], 0) };
+}
+
+function bounds() { // of all stages, so that the view stays still
+  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  const add = (p) => p.forEach((v, k) => { low[k] = Math.min(low[k], v); high[k] = Math.max(high[k], v); });
+  for (const { scene } of data.stages) {
+    if (!scene) continue;
+    for (const surface of scene.surfaces) {
+      const corners = numbers(surface.corners, Float32Array);
+      for (let n = 0; n < corners.length; n += 3) add([corners[n], corners[n + 1], corners[n + 2]]);
+    }
+    scene.arrows.forEach((arrow) => add(arrow.tip));
+  }
+  return [0, 1, 2].map((k) => [low[k] - 0.05, high[k] + 0.05]);
+}
+
+function drawScene(ranges, view) {
+  const scene = data.stages[at].scene;
+  const axes = Object.fromEntries(["x", "y", "z"].map((c, k) => [`${c}axis`, { ...axis(`${c} of W [m]`), range: ranges[k] }]));
+  const layout = { margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: ink("back"), showlegend: false, uirevision: "kept",
+    hoverlabel: { align: "left" }, scene: { ...axes, aspectmode: "data", dragmode: "orbit" } };
+  if (view) layout.scene.camera = cameraOf(view);
+  return Plotly.react(byId("scene"), scene ? sceneTraces(scene) : [], layout, config);
+}
+
+// Slices, margin, tables, notes ----------------------------------------------------------------
+
+const flatAxis = (title) => ({ title: { text: title }, color: ink("dim"), gridcolor: ink("line"), zerolinecolor: ink("dim"), automargin: true });
+const flatLayout = (more) => ({ margin: { l: 50, r: 10, t: 30, b: 40 }, paper_bgcolor: ink("back"), plot_bgcolor: ink("back"),
+  showlegend: false, font: { color: ink("ink") }, dragmode: false, ...more });
+
+function drawSlices(slices) {
+  byId("spaces").hidden = !slices.length;
+  const place = byId("slices");
+  while (place.children.length > slices.length) { Plotly.purge(place.lastChild); place.lastChild.remove(); }
+  while (place.children.length < slices.length) place.append(made("div", "", "slice"));
+  slices.forEach((slice, n) => {
+    const outline = (corners, name, more) => ({ type: "scatter", mode: "lines", fill: "toself", name, hoverinfo: "skip",
+      x: [...corners, corners[0]].map((c) => c?.[0]), y: [...corners, corners[0]].map((c) => c?.[1]), ...more });
+    const colour = ink("load"), traces = [outline(slice.whole, "any", { line: { color: colour, width: 1 }, opacity: 0.35 })];
+    if (slice.held) traces.push(outline(slice.held, "used", { line: { color: colour, width: 2 }, opacity: 0.9 }));
+    traces.push({ type: "scatter", mode: "markers", x: [slice.used[0]], y: [slice.used[1]], text: [slice.utilisation.toFixed(2)],
+      marker: { size: 11, color: colourOf(slice.utilisation), line: { color: ink("ink"), width: 1.5 } },
+      hovertemplate: "F<sub>x</sub> %{x:.1f} N, F<sub>z</sub> %{y:.1f} N<br>utilisation %{text}<extra></extra>" });
+    Plotly.react(place.children[n], traces, flatLayout({ title: { text: words(slice.limb), font: { size: 14 } },
+      xaxis: flatAxis("F<sub>x</sub> in H [N]"), yaxis: flatAxis("F<sub>z</sub> in H [N]") }), config);
+  });
+}
+
+function drawMargin() {
+  const stages = data.stages, margins = stages.map((s) => (s.utilisation ?? null) === null ? null : s.limit - s.utilisation);
+  const names = stages.map((s, n) => `${n} · ${s.name}`), known = margins.filter((m) => m !== null);
+  const low = Math.max(Math.min(0, ...known), -1);
+  const text = stages.map((s, n) => margins[n] === null ? s.status : `margin ${margins[n].toFixed(2)}, utilisation ${s.utilisation.toFixed(2)}`);
+  const bars = { type: "bar", x: stages.map((_, n) => n), y: margins.map((m) => m === null ? 0 : Math.max(m, low)), text: names, customdata: text,
+    textposition: "none", hovertemplate: "%{text}<br>%{customdata}<extra></extra>",
+    marker: { color: stages.map((s) => colourOf(s.utilisation ?? 2)), line: { color: ink("ink"), width: stages.map((_, n) => n === at ? 3 : 0) } } };
+  const none = { type: "scatter", mode: "markers", x: stages.map((_, n) => n).filter((n) => margins[n] === null), hoverinfo: "skip",
+    marker: { symbol: "x", size: 10, color: data.colours.overload } };
+  none.y = none.x.map(() => 0);
+  const crux = { x: data.crux, y: margins[data.crux] ?? 0, text: "crux", showarrow: true, arrowhead: 2, ax: 0, ay: -28, arrowcolor: ink("ink") };
+  return Plotly.react(byId("margin"), [bars, none], flatLayout({ margin: { l: 50, r: 10, t: 32, b: 40 }, annotations: [crux],
+    xaxis: { ...flatAxis("stage"), zeroline: false, dtick: stages.length > 25 ? 5 : 1 }, yaxis: flatAxis("margin [1]") }), config);
+}
+
+function written(value) {
+  if (value === null || value === undefined) return "–";
+  if (typeof value !== "number" || Number.isInteger(value)) return String(value);
+  return Math.abs(value) < 1e-6 ? "0" : Math.abs(value) < 0.1 ? value.toPrecision(2) : value.toFixed(Math.abs(value) < 10 ? 2 : 1);
+}
+
+function drawTable(table, place) {
+  const columns = table.columns.split(",");
+  const sorted = order[table.title], rows = [...table.rows];
+  const compare = (a, b) => typeof a === "number" && typeof b === "number" ? a - b : String(a ?? "").localeCompare(String(b ?? ""));
+  if (sorted) rows.sort((a, b) => sorted.sign * compare(a[sorted.column], b[sorted.column]));
+  const shown = made("table"), head = shown.createTHead().insertRow(), body = shown.createTBody();
+  const isWord = columns.map((_, n) => table.rows.some((row) => typeof row[n] === "string"));
+  columns.forEach((column, n) => {
+    const cell = made("th", "", isWord[n] ? "words" : ""), button = made("button", column);
+    if (sorted?.column === n) cell.ariaSort = sorted.sign > 0 ? "ascending" : "descending";
+    button.onclick = () => { // numbers begin with the largest
+      const first = isWord[n] ? 1 : -1;
+      order[table.title] = { column: n, sign: sorted?.column === n ? -sorted.sign : first };
+      drawTable(table, place);
+      place.querySelectorAll("th button")[n].focus();
+    };
+    cell.append(button); head.append(cell);
+  });
+  for (const row of rows) {
+    const line = body.insertRow();
+    row.forEach((value, n) => {
+      const cell = Object.assign(line.insertCell(), { textContent: written(value), className: isWord[n] ? "words" : "" });
+      if (columns[n].endsWith("utilisation") && value !== null) { cell.className = "used"; cell.style.setProperty("--used", colourOf(value)); }
+    });
+  }
+  place.replaceChildren(shown);
+}
+
+function listed(title, lines) {
+  const list = made("ul");
+  lines.forEach((line) => list.append(made("li", line)));
+  byId("notes").append(made("h2", title), list);
+}
+
+function showWords(stage) {
+  const parts = (stage.utilisation ?? null) === null ? [] : [`utilisation ${stage.utilisation.toFixed(2)} of ${stage.limit}`];
+  if ((stage.load_factor ?? null) !== null) parts.push(`load factor ${stage.load_factor.toFixed(2)}`);
+  else if (stage.load_factor_status === "unbounded") parts.push("load factor unbounded");
+  byId("outcome").replaceChildren(made("span", stage.status, `status ${stage.status}`), parts.join(", "));
+  byId("sentence").textContent = stage.sentence;
+  byId("notes").replaceChildren();
+  if (stage.advice?.length) listed("Advice: changes that were planned and verified", stage.advice.map((a) =>
+    `${a.holds ? "holds" : "less overloaded"}, utilisation ${a.utilisation.toFixed(2)}: ${a.sentence}`));
+  else if (stage.advice) listed("Advice", ["no change that was tried helps"]);
+  if (stage.warnings?.length) listed("Warnings", stage.warnings);
+  byId("tables").replaceChildren(...(stage.tables ?? []).flatMap((table) => {
+    const place = made("div", "", "table");
+    drawTable(table, place);
+    return [made("h2", table.title), place];
+  }));
+}
+
+// Together ---------------------------------------------------------------------------------------
+
+async function show(ranges, view) {
+  const stage = data.stages[at];
+  showWords(stage);
+  drawSlices(stage.slices ?? []);
+  if (data.stages.length > 1) {
+    byId("stage").value = at;
+    byId("where").textContent = `stage ${at} of ${data.stages.length - 1}: ${stage.name}` + (at === data.crux ? ", the crux" : "");
+    await drawMargin();
+  }
+  await drawScene(ranges, view);
+  document.body.dataset.shown = at;
+}
+
+async function start() {
+  byId("title").textContent = data.title;
+  byId("colours").style.background = `linear-gradient(to right, ${data.colours.utilisation.join(",")})`;
+  byId("over").style.background = data.colours.overload;
+  const packed = new Blob([bytesOf(byId("plotly").textContent)]).stream().pipeThrough(new DecompressionStream("gzip"));
+  document.head.append(made("script", await new Response(packed).text()));
+  const ranges = bounds(), views = data.stages.find((s) => s.scene)?.scene.views ?? {};
+  for (const [name, view] of Object.entries(views)) {
+    const button = made("button", name);
+    button.onclick = () => Plotly.relayout(byId("scene"), { "scene.camera": cameraOf(view) });
+    byId("views").append(button);
+  }
+  for (const name of Object.keys(shownKinds)) {
+    const label = made("label", ` ${name}`), box = Object.assign(made("input"), { type: "checkbox", checked: shownKinds[name] });
+    box.onchange = () => { shownKinds[name] = box.checked; show(ranges); };
+    label.prepend(box); byId("views").append(label);
+  }
+  const go = (stage) => { at = Math.min(Math.max(stage, 0), data.stages.length - 1); return show(ranges); };
+  if (data.stages.length > 1) {
+    byId("along").hidden = false;
+    byId("stage").max = data.stages.length - 1;
+    byId("stage").oninput = () => go(Number(byId("stage").value));
+    byId("before").onclick = () => go(at - 1);
+    byId("after").onclick = () => go(at + 1);
+  }
+  await show(ranges, views.oblique);
+  if (data.stages.length > 1) byId("margin").on("plotly_click", (event) => go(event.points[0].x));
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show(ranges));
+}
+
+start().catch((error) => {
+  byId("sentence").append(made("strong", ` This page cannot be drawn here: ${error.message}`));
+  console.error(error);
+});

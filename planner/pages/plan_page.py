@@ -1,0 +1,84 @@
+"""Page of a plan: the robot on the rock, wrench spaces of its hands, tables and advice."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from hand_models.base import SolverError
+from planner.pages.documents import write_document
+from planner.pages.plan_rows import plan_tables
+from planner.pages.scenes import Meshes, scene_data
+from planner.pages.wrench_slices import wrench_slice
+from planner.question import Question
+from planner.result import HandPlan, Plan
+
+__all__ = ["shown_plan", "write_plan_page"]
+
+
+def write_plan_page(plan: Plan, question: Question, path: Path, title: str) -> None:
+    """Write a plan as a page for a browser: one file, which loads nothing else.
+
+    Parameters
+    ----------
+    plan : Plan
+        Any status; without loads only hands, holds and limbs are drawn.
+    question : Question
+        Question that the plan answers.
+    path : Path
+        File of HTML to write.
+    title : str
+        Title of the page.
+
+    Raises
+    ------
+    UnsupportedError
+        If plotly is not installed.
+    """
+    meshes = Meshes()
+    shown = shown_plan(plan, question, meshes)
+    write_document(title, {"stages": [shown], "meshes": meshes.packed}, path)
+
+
+def shown_plan(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]:
+    """Return what a page shows of a plan, as plain data.
+
+    Parameters
+    ----------
+    plan : Plan
+        Any status.
+    question : Question
+        Question that the plan answers.
+    meshes : Meshes
+        Meshes of the page, to which those of the plan are added.
+    """
+    cap = question.limits.utilisation
+    return {
+        "status": plan.status,
+        "sentence": plan.reason,
+        "utilisation": plan.utilisation,
+        "limit": cap,
+        "load_factor": plan.load_factor,
+        "load_factor_status": plan.load_factor_status,
+        "scene": scene_data(plan, question, meshes),
+        "slices": [_slice(hand) for hand in plan.hands or ()],
+        "tables": [each._asdict() for each in plan_tables(plan, question)],
+        "warnings": list(plan.warnings),
+        "advice": None
+        if plan.advice is None
+        else [
+            {"sentence": each.sentence, "utilisation": each.utilisation, "holds": each.holds}
+            for each in plan.advice
+        ],
+    }
+
+
+def _slice(hand: HandPlan) -> dict[str, Any]:
+    """Return the slice of a hand's wrench space; without its corners where a program fails."""
+    found: dict[str, Any] = {"limb": hand.limb, "utilisation": hand.utilisation}
+    try:
+        held, whole, used = wrench_slice(hand.space, hand.wrench)
+    except SolverError:
+        return found | {"held": None, "whole": [], "used": hand.wrench[[0, 2]].tolist()}
+    corners = None if held is None else held.round(2).tolist()
+    return found | {"held": corners, "whole": whole.round(2).tolist(), "used": used.tolist()}

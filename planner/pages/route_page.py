@@ -1,0 +1,45 @@
+"""Page of a climb: its stages one by one, and the margin along it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from planner.pages.documents import write_document
+from planner.pages.plan_page import shown_plan
+from planner.pages.scenes import Meshes
+from planner.result import Plan
+from planner.route import OutOfReach, RouteResult, RouteStage
+
+__all__ = ["write_route_page"]
+
+
+def write_route_page(result: RouteResult, path: Path) -> None:
+    """Write the plans of a climb as a page for a browser, with a slider over its stages.
+
+    Parameters
+    ----------
+    result : RouteResult
+        Plans of all stages of the climb.
+    path : Path
+        File of HTML to write.
+
+    Raises
+    ------
+    UnsupportedError
+        If plotly is not installed.
+    """
+    meshes = Meshes()
+    stages = [_shown(*each, meshes) for each in zip(result.stages, result.plans, strict=True)]
+    data = {"stages": stages, "crux": result.crux, "meshes": meshes.packed}
+    write_document(result.route.name, data, path)
+
+
+def _shown(stage: RouteStage, plan: Plan | OutOfReach, meshes: Meshes) -> dict[str, Any]:
+    """Return what the page shows of a stage; of one out of reach, only why."""
+    limb = (stage.limb or "").replace("_", " ")
+    name = "start" if stage.move == 0 else f"{stage.move} {stage.phase} {limb}".rstrip()
+    if isinstance(plan, Plan):
+        return {"name": name} | shown_plan(plan, stage.question, meshes)
+    limit = stage.question.limits.utilisation
+    return {"name": name, "status": plan.status, "sentence": plan.reason, "limit": limit}

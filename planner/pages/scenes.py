@@ -1,0 +1,155 @@
+"""A plan's scene as plain data for the script of a page: meshes, lines, dots, arrows and tiles."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from typing import Any
+
+import numpy as np
+
+from hand_models.base import Array, Indices
+from planner.pictures import WORLD_UP, DrawnSurface, drawn_scene, view_directions
+from planner.question import HandOnHold, Question
+from planner.result import HandPlan, Plan
+
+__all__ = ["Meshes", "scene_data"]
+
+
+class Meshes:
+    """Surfaces of all scenes of a page, each kept once: most of a climb's do not move.
+
+    Attributes
+    ----------
+    packed : list of str
+        Little-endian numbers in base64: corners in W [m] as 32-bit floats, or indices of the
+        triangles' corners as 16-bit integers.
+    """
+
+    def __init__(self) -> None:
+        self.packed: list[str] = []
+        self._known: dict[str, int] = {}
+
+    def index_of(self, numbers: Array | Indices) -> int:
+        """Return the place among ``packed`` of corners, or of triangles, shape (n, 3)."""
+        whole = np.issubdtype(numbers.dtype, np.integer)
+        text = b64encode(numbers.astype("<u2" if whole else "<f4").tobytes()).decode()
+        if text not in self._known:
+            self._known[text] = len(self.packed)
+            self.packed.append(text)
+        return self._known[text]
+
+    def of(self, surface: DrawnSurface) -> dict[str, Any]:
+        """Return a surface with the places of its corners, to a tenth of a millimetre."""
+        corners, inverse = np.unique(surface.vertices.round(4), axis=0, return_inverse=True)
+        if surface.kind != "rock":
+            # alike from capsule to capsule, so that triangles are kept once
+            corners, inverse = surface.vertices.round(4), np.arange(len(surface.vertices))
+        return {
+            "kind": surface.kind,
+            "limb": surface.name,
+            "corners": self.index_of(corners),
+            "triangles": self.index_of(inverse.ravel()[surface.faces]),
+        }
+
+
+def scene_data(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]:
+    """Return the scene of a plan, with its tiles, as plain data in W.
+
+    Parameters
+    ----------
+    plan : Plan
+        Any status; without loads there are no tiles and no forces of hands.
+    question : Question
+        Question that the plan answers.
+    meshes : Meshes
+        Meshes of the page, to which those of the scene are added.
+
+    Returns
+    -------
+    dict of str to object
+        ``surfaces``, ``lines``, ``dots``, ``arrows`` and ``labels`` of the `DrawnScene`; ``tiles``
+        of the plan; ``views``: unit vectors from the scene to the eye and upward, in W, by name.
+    """
+    scene = drawn_scene(plan, question, fineness=5)
+    seen = view_directions(question.stance)
+    aside = np.cross(seen.ahead, WORLD_UP)
+    eyes = {
+        "oblique": -seen.into - 0.3 * seen.ahead * seen.steep + 0.6 * aside,
+        "facing the rock": -seen.into,
+        "from the side": aside,
+    }
+    hands = {hand.limb: hand for hand in question.stance.hands}
+    return {
+        "surfaces": [meshes.of(s) for s in scene.surfaces if len(s.faces)],
+        "lines": [{"kind": line.kind, "points": _places(line.points)} for line in scene.lines],
+        "dots": [
+            {"kind": dots.kind, "points": _places(dots.points), "used": _used(dots.utilisations)}
+            for dots in scene.dots
+        ],
+        "arrows": [
+            {
+                "kind": arrow.kind,
+                "start": _places(arrow.start),
+                "tip": _places(arrow.start + scene.scale * arrow.force),
+                "force": arrow.force.round(1).tolist(),
+                "text": arrow.text,
+                "used": arrow.utilisation,
+            }
+            for arrow in scene.arrows
+        ],
+        "labels": [{"place": _places(each.place), "text": each.text} for each in scene.labels],
+        "tiles": [
+            tile
+            for planned in plan.hands or ()
+            for tile in _tiles(planned, hands[planned.limb], question, scene.scale)
+        ],
+        "views": {
+            name: {
+                "eye": _places(eye / np.linalg.norm(eye)),
+                "up": _places(seen.ahead if seen.steep and eye is not aside else WORLD_UP),
+            }
+            for name, eye in eyes.items()
+        },
+    }
+
+
+def _tiles(
+    planned: HandPlan, hand: HandOnHold, question: Question, scale: float
+) -> list[dict[str, Any]]:
+    """Return the tiles of a hand that touch rock: corners, forces of the rock on them, words."""
+    turn, size = hand.pose.rotation, question.stance.robot.hand.finger
+    half = 0.5 * np.array([size.tile_length, size.tile_width])
+    found = []
+    for t, tile in enumerate(planned.tiles):
+        if tile.contact == "none":
+            continue
+        shear, normal, lateral = planned.loads[t].tolist()
+        along, across = planned.axes[t, [0, 2]] * half[:, None]
+        middle, force = planned.positions[t], -turn @ planned.forces[t]
+        corners = middle + np.array([along + across, along - across, -along - across])
+        corners = np.vstack([corners, middle - along + across])
+        start = hand.pose.apply(middle)
+        found.append(
+            {
+                "limb": planned.limb,
+                "finger": tile.finger,
+                "phalanx": tile.phalanx,
+                "corners": _places(hand.pose.apply(corners)),
+                "start": _places(start),
+                "tip": _places(start + scale * force),
+                "used": float(planned.tile_utilisations[t]),
+                "shear": shear,
+                "normal": normal,
+                "lateral": lateral,
+            }
+        )
+    return found
+
+
+def _places(points: Array) -> Any:
+    """Return points as lists, to a tenth of a millimetre."""
+    return np.asarray(points).round(4).tolist()
+
+
+def _used(utilisations: Array | None) -> list[float] | None:
+    return None if utilisations is None else utilisations.round(4).tolist()

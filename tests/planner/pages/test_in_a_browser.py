@@ -1,0 +1,96 @@
+"""Pages in headless Chromium: they draw, they answer, and their console has no error."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+
+import pytest
+
+from planner import evaluate
+from planner.pages import write_plan_page, write_route_page
+from service.answering import route_of
+from service.commands.stances import read_route
+from tests.suite.helpers.pictures import answered
+
+BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
+HEADLESS = [
+    "--headless", "--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader",
+    "--window-size=1280,900", "--enable-logging=stderr", "--v=0", "--virtual-time-budget=30000",
+]  # fmt: skip
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(BROWSER is None, reason="Chromium is not installed"),
+]
+
+PRESSED = """
+<script>
+const seen = {};
+const settled = async (ready) => { while (!ready()) await new Promise((r) => setTimeout(r, 20)); };
+(async () => {
+  await settled(() => document.body.dataset.shown !== undefined);
+  seen.traces = document.getElementById("scene").data.length;
+  seen.drawn = document.querySelectorAll("#slices .main-svg").length > 0;
+  seen.wide = document.documentElement.scrollWidth <= innerWidth;
+  const column = () => [...document.querySelectorAll("#tables tbody")].at(0).rows;
+  document.querySelectorAll("#tables th button")[1].click();
+  seen.sorted = [...column()].map((row) => Number(row.cells[1].textContent));
+  seen.sort = document.querySelectorAll("#tables th")[1].ariaSort;
+  STEPS
+  const told = { id: "seen", textContent: JSON.stringify(seen) };
+  document.body.append(Object.assign(document.createElement("pre"), told));
+})();
+</script></body>"""
+
+STEPS = """
+  const slider = document.getElementById("stage");
+  slider.value = 0; slider.dispatchEvent(new Event("input"));
+  await settled(() => document.body.dataset.shown === "0");
+  seen.first = document.getElementById("where").textContent;
+  document.getElementById("after").click();
+  await settled(() => document.body.dataset.shown === "1");
+  seen.second = document.getElementById("where").textContent;
+  seen.bars = document.querySelectorAll("#margin .bars .point").length;
+"""
+
+
+def opened(file, steps=""):
+    """What a browser shows of a page once its buttons were pressed, and what was seen meanwhile."""
+    text = file.read_text("utf-8").replace("</body>", PRESSED.replace("STEPS", steps))
+    file.write_text(text, "utf-8")
+    done = subprocess.run(
+        [BROWSER, *HEADLESS, "--dump-dom", file.as_uri()],
+        capture_output=True, text=True, timeout=300, check=True,
+    )  # fmt: skip
+    console = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    assert [line for line in console if re.search("error|uncaught", line, re.IGNORECASE)] == []
+    return json.loads(re.search(r'<pre id="seen">(.*?)</pre>', done.stdout)[1]), done.stdout
+
+
+def test_a_plan_is_drawn_and_its_tables_sort(tmp_path):
+    question, plan = answered("solved")
+    write_plan_page(plan, question, tmp_path / "plan.html", "a wall")
+    seen, page = opened(tmp_path / "plan.html")
+    assert plan.reason in page
+    assert "<canvas" in page
+    assert seen["drawn"]
+    assert seen["wide"]
+    # of rock, palms, body, links, lines, dots, tiles; and three for each force
+    assert seen["traces"] == 12 + 3 * (len(plan.hands) + 1)
+    used = sorted((round(hand.utilisation, 2) for hand in plan.hands), reverse=True)
+    assert (seen["sort"], seen["sorted"]) == ("descending", used)
+
+
+def test_a_climb_is_drawn_stage_by_stage(tmp_path):
+    found, file = evaluate(route_of(read_route("knobs")), 1), tmp_path / "route.html"
+    write_route_page(found, file)
+    assert file.stat().st_size < 6e6
+    seen, _ = opened(file, STEPS)
+    count = len(found.stages)
+    assert seen["first"] == f"stage 0 of {count - 1}: start"
+    assert seen["second"].startswith(f"stage 1 of {count - 1}: 1 ")
+    assert seen["bars"] == count
+    assert seen["drawn"]

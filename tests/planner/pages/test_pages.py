@@ -1,0 +1,196 @@
+"""Pages for a browser: what their data say is what the plan says, and they load nothing else."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from base64 import b64decode
+from functools import cache
+
+import numpy as np
+import pytest
+
+from hand_models.base import UnsupportedError
+from hand_models.wrench_spaces import Row, WrenchSpace
+from planner import evaluate
+from planner.pages import document, wrench_slice, write_plan_page, write_route_page
+from planner.pictures import drawn_scene
+from service.answering import route_of
+from service.commands.stances import read_route
+from tests.suite.helpers.pictures import answered
+
+MOST_BYTES = 6e6
+
+
+@cache
+def result():
+    return evaluate(route_of(read_route("six-moves")), 1)
+
+
+def data_of(text):
+    (found,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', text)
+    return json.loads(found)
+
+
+def shown(name, tmp_path):
+    """A plan by name with its question, and the data of its page."""
+    question, plan = answered(name)
+    write_plan_page(plan, question, tmp_path / "plan.html", name)
+    return question, plan, data_of((tmp_path / "plan.html").read_text("utf-8"))
+
+
+def unpacked(data, surface):
+    """Corners of a surface's triangles, shape (n, 3, 3)."""
+    corners, faces = (b64decode(data["meshes"][surface[k]]) for k in ("corners", "triangles"))
+    return np.frombuffer(corners, "<f4").reshape(-1, 3)[np.frombuffer(faces, "<u2").reshape(-1, 3)]
+
+
+@pytest.mark.parametrize("name", ["solved", "overloaded", "floating", "nails"])
+def test_tiles_have_the_plans_numbers(name, tmp_path):
+    _, plan, data = shown(name, tmp_path)
+    (stage,) = data["stages"]
+    touching = [
+        (hand.limb, tile.finger, tile.phalanx, used, *loads)
+        for hand in plan.hands
+        for tile, used, loads in zip(
+            hand.tiles, hand.tile_utilisations, hand.loads.tolist(), strict=True
+        )
+        if tile.contact != "none"
+    ]
+    keys = ("limb", "finger", "phalanx", "used", "shear", "normal", "lateral")
+    assert [tuple(tile[k] for k in keys) for tile in stage["scene"]["tiles"]] == touching
+    assert (stage["status"], stage["sentence"]) == (plan.status, plan.reason)
+    assert stage["utilisation"] == plan.utilisation
+
+
+@pytest.mark.parametrize("name", ["solved", "ceiling", "two hands"])
+def test_drawn_forces_of_tiles_and_palm_add_up_to_the_hands(name, tmp_path):
+    question, plan, data = shown(name, tmp_path)
+    scene = data["stages"][0]["scene"]
+    arrows = [arrow for arrow in scene["arrows"] if arrow["kind"] == "force"]
+    for hand, planned, arrow in zip(question.stance.hands, plan.hands, arrows, strict=True):
+        step = np.subtract(arrow["tip"], arrow["start"])
+        scale = np.linalg.norm(step) / np.linalg.norm(arrow["force"])
+        tiles = [t for t in scene["tiles"] if t["limb"] == planned.limb]
+        forces = sum(np.subtract(t["tip"], t["start"]) for t in tiles) / scale
+        palm = -hand.pose.rotation @ planned.palm.force
+        # places are rounded to a tenth of a millimetre
+        np.testing.assert_allclose(forces + palm, arrow["force"], atol=0.02 / scale * 0.15)
+        middles = [np.mean(t["corners"], axis=0) for t in tiles]
+        np.testing.assert_allclose(middles, [t["start"] for t in tiles], atol=2e-4)
+
+
+@pytest.mark.parametrize("name", ["solved", "infeasible"])
+def test_surfaces_are_those_of_the_pictures_scene(name, tmp_path):
+    question, plan, data = shown(name, tmp_path)
+    scene = drawn_scene(plan, question, fineness=5)
+    wanted = [s for s in scene.surfaces if len(s.faces)]
+    for drawn, surface in zip(wanted, data["stages"][0]["scene"]["surfaces"], strict=True):
+        assert (surface["kind"], surface["limb"]) == (drawn.kind, drawn.name)
+        np.testing.assert_allclose(unpacked(data, surface), drawn.triangles, atol=6e-5)
+
+
+def test_tables_have_the_plans_numbers(tmp_path):
+    _, plan, data = shown("solved", tmp_path)
+    tables = {table["title"].partition(":")[0]: table for table in data["stages"][0]["tables"]}
+    for table in tables.values():
+        assert all(len(row) == len(table["columns"].split(",")) for row in table["rows"])
+    hands = [row[2:8] for row in tables["Hands"]["rows"]]
+    assert hands == [hand.wrench.tolist() for hand in plan.hands]
+    loads = np.array([row[-3:] for row in tables["Tiles"]["rows"]])
+    np.testing.assert_array_equal(loads, np.vstack([hand.loads for hand in plan.hands]))
+    tensions = [row[2] for row in tables["Tendons and their motors"]["rows"]]
+    assert tensions == np.concatenate([hand.tensions for hand in plan.hands]).tolist()
+    torques = [row[4] for row in tables["Joints, from the body outward"]["rows"]]
+    limbs = (plan.joint_torque[limb].tolist() for limb in plan.joints)
+    assert torques == [torque for limb in limbs for torque in limb]
+
+
+def test_without_balance_a_page_says_what_is_in_the_way(tmp_path):
+    _, plan, data = shown("infeasible", tmp_path)
+    (stage,) = data["stages"]
+    assert stage["scene"]["tiles"] == stage["slices"] == []
+    (table,) = stage["tables"]
+    names = plan.certificate.irreducible or plan.certificate.blocking
+    assert [row[0] for row in table["rows"]] == [name.limb.replace("_", " ") for name in names]
+
+
+def test_a_page_of_a_climb_has_all_stages_and_the_margin_along_them(tmp_path):
+    found, file = result(), tmp_path / "route.html"
+    write_route_page(found, file)
+    data = data_of(file.read_text("utf-8"))
+    assert file.stat().st_size < MOST_BYTES
+    assert len(data["stages"]) == len(found.stages)
+    assert data["crux"] == found.crux
+    for stage, plan in zip(data["stages"], found.plans, strict=True):
+        assert stage["utilisation"] == plan.utilisation
+        assert len(stage["slices"]) == len(plan.hands)
+    margins = [stage["limit"] - stage["utilisation"] for stage in data["stages"]]
+    assert np.argmin(margins) == data["crux"]
+    # what does not move is there once
+    first, second = (
+        {s["corners"] for s in stage["scene"]["surfaces"] if s["kind"] == "body"}
+        for stage in data["stages"][:2]
+    )
+    assert first == second
+
+
+def test_a_page_loads_nothing_and_ends_no_script_by_its_words(tmp_path):
+    question, plan = answered("solved")
+    title = "</script><script src='http://example.org/x.js'></script>"
+    write_plan_page(plan, question, tmp_path / "plan.html", title)
+    text = (tmp_path / "plan.html").read_text("utf-8")
+    assert len(text.encode()) < MOST_BYTES
+    assert data_of(text)["title"] == title
+    assert text.count("<script") == text.count("</script>") == 3
+    tags = re.findall(r"<(?:script|link|img|iframe)\b[^>]*>", text)
+    assert [tag for tag in tags if re.search(r"src=|href=(?!\"data:)", tag)] == []
+    own = re.sub(r"(?s:<script type.*?</script>)|<title>.*?</title>", "", text)
+    assert not re.search(r"@import|url\(|https?://", own)
+
+
+def test_without_the_library_a_page_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "plotly", None)
+    monkeypatch.delitem(sys.modules, "plotly.offline", raising=False)
+    with pytest.raises(UnsupportedError, match=r"needs plotly.*\[view\]"):
+        document("plan", {"stages": [], "meshes": []})
+
+
+# Slices -------------------------------------------------------------------------------------------
+
+
+def space(L, s):
+    """A wrench space whose loads are the wrench, within L w ≤ s and w ≥ −s of the first rows."""
+    rows = tuple(Row(None, None, "shear", "limit", f"{i}") for i in range(len(s)))
+    names = tuple(f"{i}" for i in range(6))
+    hard = np.zeros((0, 6)), np.zeros(0)
+    return WrenchSpace(np.zeros(6), np.eye(6), names, rows, L, np.zeros(len(s)), s, *hard)
+
+
+def test_a_slice_holds_the_other_components_and_a_projection_frees_them():
+    # |w| ≤ 2 each, and fx + my ≤ 2
+    L = np.vstack([np.eye(6), -np.eye(6), [[1, 0, 0, 0, 1, 0]]]).astype(float)
+    found = wrench_slice(space(L, np.full(13, 2.0)), np.array([0.0, 0.0, 1.0, 0.0, 0.5, 0.0]))
+    assert sorted(map(tuple, found.held.round(6))) == [(-2, -2), (-2, 2), (1.5, -2), (1.5, 2)]
+    assert sorted(map(tuple, found.whole.round(6))) == [(-2, -2), (-2, 2), (2, -2), (2, 2)]
+    assert found.used.tolist() == [0.0, 1.0]
+
+
+def test_beyond_the_limits_there_is_no_slice():
+    L = np.vstack([np.eye(6), -np.eye(6)])
+    found = wrench_slice(space(L, np.full(12, 2.0)), np.array([0.0, 0.0, 0.0, 0.0, 3.0, 0.0]))
+    assert found.held is None
+    assert len(found.whole) == 4
+
+
+def test_corners_of_a_plans_slices_are_wrenches_that_the_hand_can_exert():
+    _, plan = answered("plain")
+    for hand in plan.hands:
+        found = wrench_slice(hand.space, hand.wrench)
+        for corner in found.held:
+            wrench = hand.wrench.copy()
+            wrench[[0, 2]] = corner
+            assert hand.space.contains(wrench, tolerance=1e-4)
+            beyond = wrench + 1.01 * (wrench - hand.wrench)
+            assert not hand.space.contains(beyond, tolerance=1e-4)
