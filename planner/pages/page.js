@@ -31,7 +31,7 @@ function meshOf(surfaces, more) { // many surfaces as one mesh, its text at each
   const mesh = { type: "mesh3d", x: [], y: [], z: [], i: [], j: [], k: [], hoverinfo: "skip", ...more };
   for (const surface of surfaces) {
     const first = mesh.x.length;
-    const corners = numbers(surface.corners, Float32Array), triangles = numbers(surface.triangles, Uint16Array);
+    const corners = numbers(surface.corners, Float32Array), triangles = numbers(surface.triangles, Uint32Array);
     for (let n = 0; n < corners.length; n += 3) {
       mesh.x.push(corners[n]); mesh.y.push(corners[n + 1]); mesh.z.push(corners[n + 2]);
     }

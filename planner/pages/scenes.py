@@ -22,7 +22,7 @@ class Meshes:
     ----------
     packed : list of str
         Little-endian numbers in base64: corners in W [m] as 32-bit floats, or indices of the
-        triangles' corners as 16-bit integers.
+        triangles' corners as 32-bit integers.
     """
 
     def __init__(self) -> None:
@@ -32,23 +32,28 @@ class Meshes:
     def index_of(self, numbers: Array | Indices) -> int:
         """Return the place among ``packed`` of corners, or of triangles, shape (n, 3)."""
         whole = np.issubdtype(numbers.dtype, np.integer)
-        text = b64encode(numbers.astype("<u2" if whole else "<f4").tobytes()).decode()
+        text = b64encode(numbers.astype("<u4" if whole else "<f4").tobytes()).decode()
         if text not in self._known:
             self._known[text] = len(self.packed)
             self.packed.append(text)
         return self._known[text]
 
-    def of(self, surface: DrawnSurface) -> dict[str, Any]:
-        """Return a surface with the places of its corners, to a tenth of a millimetre."""
-        corners, inverse = np.unique(surface.vertices.round(4), axis=0, return_inverse=True)
-        if surface.kind != "rock":
-            # alike from capsule to capsule, so that triangles are kept once
-            corners, inverse = surface.vertices.round(4), np.arange(len(surface.vertices))
+    def of(self, surface: DrawnSurface, into: Array) -> dict[str, Any]:
+        """Return a surface with the places of its corners, to a tenth of a millimetre.
+
+        Triangles of rock are ordered along ``into``, shape (3,): those before others hide these
+        where the surface is seen through.
+        """
+        corners, triangles = surface.vertices.round(4), surface.faces
+        if surface.kind == "rock":
+            triangles = triangles[np.argsort(surface.triangles.mean(axis=1) @ into, kind="stable")]
+            corners, inverse = np.unique(corners, axis=0, return_inverse=True)
+            triangles = inverse.ravel()[triangles]
         return {
             "kind": surface.kind,
             "limb": surface.name,
             "corners": self.index_of(corners),
-            "triangles": self.index_of(inverse.ravel()[surface.faces]),
+            "triangles": self.index_of(triangles),
         }
 
 
@@ -80,7 +85,11 @@ def scene_data(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]
     }
     hands = {hand.limb: hand for hand in question.stance.hands}
     return {
-        "surfaces": [meshes.of(s) for s in scene.surfaces if len(s.faces)],
+        "surfaces": [
+            meshes.of(each, hands[each.name].pose.rotation[:, 2] if each.name else seen.into)
+            for each in scene.surfaces
+            if len(each.faces)
+        ],
         "lines": [{"kind": line.kind, "points": _places(line.points)} for line in scene.lines],
         "dots": [
             {"kind": dots.kind, "points": _places(dots.points), "used": _used(dots.utilisations)}

@@ -43,7 +43,7 @@ def shown(name, tmp_path):
 def unpacked(data, surface):
     """Corners of a surface's triangles, shape (n, 3, 3)."""
     corners, faces = (b64decode(data["meshes"][surface[k]]) for k in ("corners", "triangles"))
-    return np.frombuffer(corners, "<f4").reshape(-1, 3)[np.frombuffer(faces, "<u2").reshape(-1, 3)]
+    return np.frombuffer(corners, "<f4").reshape(-1, 3)[np.frombuffer(faces, "<u4").reshape(-1, 3)]
 
 
 @pytest.mark.parametrize("name", ["solved", "overloaded", "floating", "nails"])
@@ -88,7 +88,13 @@ def test_surfaces_are_those_of_the_pictures_scene(name, tmp_path):
     wanted = [s for s in scene.surfaces if len(s.faces)]
     for drawn, surface in zip(wanted, data["stages"][0]["scene"]["surfaces"], strict=True):
         assert (surface["kind"], surface["limb"]) == (drawn.kind, drawn.name)
-        np.testing.assert_allclose(unpacked(data, surface), drawn.triangles, atol=6e-5)
+        found, triangles = unpacked(data, surface), drawn.triangles
+        if drawn.kind == "rock":
+            # the nearest to the hand's back first
+            (hand,) = (h for h in question.stance.hands if h.limb == drawn.name)
+            depth = triangles.mean(axis=1) @ hand.pose.rotation[:, 2]
+            triangles = triangles[np.argsort(depth, kind="stable")]
+        np.testing.assert_allclose(found, triangles, atol=6e-5)
 
 
 def test_tables_have_the_plans_numbers(tmp_path):
