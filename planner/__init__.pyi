@@ -43,6 +43,7 @@ from .explanation import (
     constraint_words as constraint_words,
 )
 from .pages import (
+    write_climb_page as write_climb_page,
     write_plan_page as write_plan_page,
     write_route_page as write_route_page,
 )

@@ -1,3 +1,4 @@
+from .climb_page import write_climb_page as write_climb_page
 from .documents import document as document
 from .plan_page import write_plan_page as write_plan_page
 from .plan_rows import PageTable as PageTable, plan_tables as plan_tables

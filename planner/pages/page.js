@@ -2,6 +2,7 @@
 const byId = (name) => document.getElementById(name);
 const data = JSON.parse(byId("data").textContent);
 const shownKinds = { rock: true, robot: true, "forces of hands": true, "forces of tiles": false };
+if (data.wall) shownKinds.placements = true;
 let at = data.crux ?? 0, order = {};
 
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
@@ -92,6 +93,17 @@ function arrowsOf(arrows, visible) {
   });
 }
 
+function wallTraces(wall) { // what a search for a climb chose from
+  const more = { meta: "placements", visible: shownKinds.placements };
+  return [
+    dotsOf(wall.places, { ...more, text: wall.carried.map((f, n) => `placement ${n}<br>carries ${f.toFixed(0)} N upward at most`),
+      hovertemplate: "%{text}<extra></extra>", marker: { size: 5, color: wall.carried, colorscale: "Viridis", showscale: true,
+        colorbar: { title: { text: "largest force upward [N]", side: "top", font: { color: ink("dim") } }, orientation: "h", y: 0,
+          yanchor: "bottom", thickness: 8, len: 0.5, tickfont: { color: ink("dim") } } } }),
+    dotsOf(wall.bodies, { ...more, marker: { size: 3, symbol: "cross", color: ink("dim") } }),
+  ];
+}
+
 function sceneTraces(scene) {
   const of = (kind) => scene.surfaces.filter((s) => s.kind === kind), flat = { flatshading: true };
   const points = (kind) => scene.dots.filter((d) => d.kind === kind).flatMap((d) => d.points);
@@ -111,6 +123,7 @@ function sceneTraces(scene) {
     dotsOf(scene.labels.map((l) => l.place), { mode: "text", text: scene.labels.map((l) => l.text), textposition: "bottom center",
       textfont: { color: ink("ink"), size: 13 } }),
     dotsOf(points("load"), { marker: { size: 6, color: ink("load") } }),
+    ...(data.wall ? wallTraces(data.wall) : []),
     ...tilesOf(scene.tiles, shownKinds["forces of tiles"]),
     ...arrowsOf(scene.arrows, shownKinds["forces of hands"]),
   ];
@@ -173,19 +186,22 @@ function drawSlices(slices) {
 }
 
 function drawMargin() {
-  const stages = data.stages, margins = stages.map((s) => (s.utilisation ?? null) === null ? null : s.limit - s.utilisation);
+  const stages = data.stages, bound = data.wall?.bound ?? null;
+  const margins = stages.map((s) => ((data.wall ? s.load_factor : s.utilisation) ?? null) === null ? null : data.wall ? s.load_factor : s.limit - s.utilisation);
   const names = stages.map((s, n) => `${n} · ${s.name}`), known = margins.filter((m) => m !== null);
   const low = Math.max(Math.min(0, ...known), -1);
-  const text = stages.map((s, n) => margins[n] === null ? s.status : `margin ${margins[n].toFixed(2)}, utilisation ${s.utilisation.toFixed(2)}`);
+  const text = stages.map((s, n) => margins[n] === null ? s.status : `${data.wall ? "load factor" : "margin"} ${margins[n].toFixed(2)}, utilisation ${s.utilisation.toFixed(2)}`);
   const bars = { type: "bar", x: stages.map((_, n) => n), y: margins.map((m) => m === null ? 0 : Math.max(m, low)), text: names, customdata: text,
     textposition: "none", hovertemplate: "%{text}<br>%{customdata}<extra></extra>",
     marker: { color: stages.map((s) => colourOf(s.utilisation ?? 2)), line: { color: ink("ink"), width: stages.map((_, n) => n === at ? 3 : 0) } } };
   const none = { type: "scatter", mode: "markers", x: stages.map((_, n) => n).filter((n) => margins[n] === null), hoverinfo: "skip",
     marker: { symbol: "x", size: 10, color: data.colours.overload } };
   none.y = none.x.map(() => 0);
-  const crux = { x: data.crux, y: margins[data.crux] ?? 0, text: "crux", showarrow: true, arrowhead: 2, ax: 0, ay: -28, arrowcolor: ink("ink") };
-  return Plotly.react(byId("margin"), [bars, none], flatLayout({ margin: { l: 50, r: 10, t: 32, b: 40 }, annotations: [crux],
-    xaxis: { ...flatAxis("stage"), zeroline: false, dtick: stages.length > 25 ? 5 : 1 }, yaxis: flatAxis("margin [1]") }), config);
+  const line = { type: "scatter", mode: "lines", x: [-0.5, stages.length - 0.5], y: [bound, bound], line: { color: ink("ink"), dash: "dash" },
+    hovertemplate: "no climb has more in all stages: %{y:.3f}<extra></extra>" };
+  const crux = { visible: data.crux !== undefined, x: data.crux, y: margins[data.crux] ?? 0, text: "crux", showarrow: true, arrowhead: 2, ax: 0, ay: -28, arrowcolor: ink("ink") };
+  return Plotly.react(byId("margin"), bound === null ? [bars, none] : [bars, none, line], flatLayout({ margin: { l: 50, r: 10, t: 32, b: 40 }, annotations: [crux],
+    xaxis: { ...flatAxis("stage"), zeroline: false, dtick: stages.length > 25 ? 5 : 1 }, yaxis: flatAxis(data.wall ? "load factor [1]" : "margin [1]") }), config);
 }
 
 function written(value) {
@@ -263,6 +279,7 @@ async function show(ranges, view) {
 
 async function start() {
   byId("title").textContent = data.title;
+  byId("about").replaceChildren(...(data.wall?.said ?? []).flatMap((line) => [line, made("br")]));
   byId("colours").style.background = `linear-gradient(to right, ${data.colours.utilisation.join(",")})`;
   byId("over").style.background = data.colours.overload;
   const packed = new Blob([bytesOf(byId("plotly").textContent)]).stream().pipeThrough(new DecompressionStream("gzip"));
@@ -286,7 +303,7 @@ async function start() {
     byId("before").onclick = () => go(at - 1);
     byId("after").onclick = () => go(at + 1);
   }
-  await show(ranges, views.oblique);
+  await show(ranges, Object.values(views)[0]);
   if (data.stages.length > 1) byId("margin").on("plotly_click", (event) => go(event.points[0].x));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show(ranges));
 }

@@ -11,7 +11,7 @@ from planner.pages.scenes import Meshes
 from planner.result import Plan
 from planner.route import OutOfReach, RouteResult, RouteStage
 
-__all__ = ["write_route_page"]
+__all__ = ["shown_stages", "write_route_page"]
 
 
 def write_route_page(result: RouteResult, path: Path) -> None:
@@ -30,9 +30,22 @@ def write_route_page(result: RouteResult, path: Path) -> None:
         If plotly is not installed.
     """
     meshes = Meshes()
-    stages = [_shown(*each, meshes) for each in zip(result.stages, result.plans, strict=True)]
+    stages = shown_stages(result, meshes)
     data = {"stages": stages, "crux": result.crux, "meshes": meshes.packed}
     write_document(result.route.name, data, path)
+
+
+def shown_stages(result: RouteResult, meshes: Meshes) -> list[dict[str, Any]]:
+    """Return what a page shows of each stage, as plain data.
+
+    Parameters
+    ----------
+    result : RouteResult
+        Plans of all stages of the climb.
+    meshes : Meshes
+        Meshes of the page, to which those of the stages are added.
+    """
+    return [_shown(*each, meshes) for each in zip(result.stages, result.plans, strict=True)]
 
 
 def _shown(stage: RouteStage, plan: Plan | OutOfReach, meshes: Meshes) -> dict[str, Any]:

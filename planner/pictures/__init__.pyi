@@ -14,6 +14,7 @@ from .plan_scene import (
 )
 from .redundancy_plots import plot_redundancy as plot_redundancy
 from .report import summary as summary, write_report as write_report
+from .rock_patches import coarse as coarse
 from .settings import PICTURE_SETTINGS as PICTURE_SETTINGS
 from .survival_plots import (
     plot_route_survival as plot_route_survival,

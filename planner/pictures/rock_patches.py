@@ -15,7 +15,7 @@ from hand_models.hand import SettledHand
 from hand_models.rock import Triangles, weld
 from planner.pictures.settings import PICTURE_SETTINGS
 
-__all__ = ["rock_patch"]
+__all__ = ["coarse", "rock_patch"]
 
 
 def rock_patch(settled: SettledHand, beside: Array | None = None) -> Array:
@@ -63,12 +63,19 @@ def _near(in_hand: Pose, vertices: Array, faces: Indices, low: Array, high: Arra
     if len(found.faces) > PICTURE_SETTINGS.rock_triangles:
         # the farther it goes, the coarser, but not as much
         farther = (high - low).max() / (2.0 * PICTURE_SETTINGS.rock_around)
-        found = _coarse(found, PICTURE_SETTINGS.rock_coarseness * math.sqrt(farther))
+        found = coarse(found, PICTURE_SETTINGS.rock_coarseness * math.sqrt(farther))
     return found
 
 
-def _coarse(triangles: Triangles, size: float) -> Triangles:
-    """Return triangles whose vertices within a cell of a grid are one, in their middle."""
+def coarse(triangles: Triangles, size: float) -> Triangles:
+    """Return triangles whose vertices within a cell of a grid are one, in their middle.
+
+    Parameters
+    ----------
+    triangles : Triangles
+    size : float
+        Side of a cell [m].
+    """
     used, faces = np.unique(triangles.faces, return_inverse=True)
     places = triangles.vertices[used]
     _, cell = np.unique(np.round(places / size), axis=0, return_inverse=True)

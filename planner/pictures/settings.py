@@ -32,6 +32,10 @@ class PictureSettings:
     """Number of triangles near a hand above which a mesh is drawn coarsely."""
     rock_coarseness: float = 0.02
     """Grid size to which such a mesh is coarsened [m]."""
+    wall_triangles: int = 30000
+    """Number of triangles above which a whole rock is drawn coarsely on a page."""
+    wall_cells: int = 100
+    """Number of grid cells along such a rock, to which it is coarsened."""
 
 
 PICTURE_SETTINGS: Final = PictureSettings()

@@ -12,4 +12,7 @@ from .listing import (
 from .naming import naming_options as naming_options, with_options as with_options
 from .seeking import seek as seek
 from .sources import Sources as Sources
-from .verdict import print_verdict as print_verdict
+from .verdict import (
+    print_verdict as print_verdict,
+    verdict_sentences as verdict_sentences,
+)

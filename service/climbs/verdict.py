@@ -12,7 +12,7 @@ from service.tables import counted
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["print_verdict"]
+__all__ = ["print_verdict", "verdict_sentences"]
 
 
 def print_verdict(
@@ -28,13 +28,21 @@ def print_verdict(
     files : mapping of str to Path
     out : Console
     """
-    for sentence in _sentences(found, at_least):
+    for sentence in verdict_sentences(found, at_least):
         out.print(sentence, markup=False, highlight=False)
     for name, path in files.items():
         out.print(f"{name}: {path}", markup=False, highlight=False, soft_wrap=True)
 
 
-def _sentences(found: FoundClimb, at_least: float | None) -> Iterator[str]:
+def verdict_sentences(found: FoundClimb, at_least: float | None) -> Iterator[str]:
+    """Yield the sentences of a verdict.
+
+    Parameters
+    ----------
+    found : FoundClimb
+    at_least : float or None
+        Load factor that was asked for.
+    """
     asked = "" if at_least is None else f" with a load factor of {at_least:g}"
     yield {
         "found": "FOUND     a climb, planned from end to end",

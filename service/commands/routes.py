@@ -155,6 +155,7 @@ sought_options = options.asked_for(
     is_flag=True,
     help="Go on where many rocks were broken off: what the file answers is not asked again.",
 )
+@options.page_option
 @options.workers_options
 @options.own_options
 @options.json_option
@@ -162,6 +163,7 @@ def climb_command(
     rocks: tuple[str, ...],
     sought: climbs.Sought,
     output: Path,
+    page: Path | None,
     resume: bool,
     parallel: options.WorkersOption,
     own: options.Own,
@@ -178,13 +180,15 @@ def climb_command(
     """
     listing = climbs.climb_listing()
     listed = batch.is_listed(output, listing, len(rocks) > 1, resume)
+    if listed and page is not None:
+        raise InvalidInputError("is for one rock, whose output -o is a folder", field="--html")
     with climbs.naming_options():
         asking = sought.asking(stances.read_request)
     sources = climbs.Sources(rocks, lambda rock: own.asked(asking(Path(rock))))
     if listed:
         return _many(listing, sources, output, resume, parallel, own, as_json)
     with climbs.naming_options():
-        return search_climb(own.asked(asking(Path(rocks[0]))), output, parallel, own, as_json)
+        return search_climb(own.asked(asking(Path(rocks[0]))), output, parallel, own, as_json, page)
 
 
 def search_climb(
@@ -193,6 +197,7 @@ def search_climb(
     parallel: options.WorkersOption,
     own: options.Own,
     as_json: bool,
+    page: Path | None = None,
 ) -> int:
     """Search for a climb, write its files, and print the verdict; return the exit status."""
     with tables.filling_folder():
@@ -207,6 +212,12 @@ def search_climb(
             asked = _Asked.of([str(files["route"])], options.Wanted(False, None, True), own)
             climb = found.found.climb
             files |= climbs.write_route(found.found.result, climb, folder, asked.stage)[0]
+    if page is not None:
+        with tables.writing(page, "--html"):
+            said = tuple(climbs.verdict_sentences(found.found, request.at_least))
+            shown = found.found, found.rock, found.rock_pose
+            planner.write_climb_page(*shown, page, request.name, said)
+        files["page"] = page
     if as_json:
         reply = msgspec.to_builtins(answering.climb_reply(request, found))
         tables.say(reply | {"files": {name: str(path) for name, path in files.items()}})

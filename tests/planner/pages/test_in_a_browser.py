@@ -6,13 +6,18 @@ import json
 import re
 import shutil
 import subprocess
+from base64 import b64decode
 
+import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from planner import evaluate
 from planner.pages import write_plan_page, write_route_page
 from service.answering import route_of
+from service.commands.cli import run_command_line
 from service.commands.stances import read_route
+from tests.suite.helpers.commands import DONE, result
 from tests.suite.helpers.pictures import answered
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
@@ -82,6 +87,34 @@ def test_a_plan_is_drawn_and_its_tables_sort(tmp_path):
     assert seen["traces"] == 12 + 3 * (len(plan.hands) + 1)
     used = sorted((round(hand.utilisation, 2) for hand in plan.hands), reverse=True)
     assert (seen["sort"], seen["sorted"]) == ("descending", used)
+
+
+def test_a_search_is_drawn_on_its_rock_with_its_placements(tmp_path, capfd):
+    file, folder = tmp_path / "climb.html", tmp_path / "climb"
+    asked = ["climb", "small-wall", "--from", "height:0.8", "--to", "height:0.8"]
+    asked += ["--stand-off", "0.6", "--spacing", "0.3", "--body-spacing", "0.3", "--workers", "1"]
+    assert run_command_line([*asked, "-o", str(folder), "--html", str(file), "--json"]) == DONE
+    reply = result(capfd)
+    assert file.stat().st_size < 6e6
+    text = file.read_text("utf-8")
+    data = json.loads(re.search(r'id="data">(.*?)</script>', text)[1])
+    wall = np.load(folder / "wall.npz")
+    np.testing.assert_allclose(data["wall"]["places"], wall["place_pose"][:, :, 3], atol=6e-5)
+    assert len(data["wall"]["bodies"]) == len(wall["body_pose"])
+    assert (data["wall"]["bound"], data["crux"]) == (reply["bound"], reply["deciding"]["stage"])
+    assert min(stage["load_factor"] for stage in data["stages"]) == reply["least"]
+    # the rock is whole in each stage, and once in the page
+    surfaces = [each for stage in data["stages"] for each in stage["scene"]["surfaces"]]
+    rocks = [each for each in surfaces if each["kind"] == "rock"]
+    assert len(rocks) == len(data["stages"])
+    assert all(rock == rocks[0] for rock in rocks)
+    # the rock is under the palm of each placement
+    corners = np.frombuffer(b64decode(data["meshes"][rocks[0]["corners"]]), "<f4").reshape(-1, 3)
+    away, _ = cKDTree(corners).query(wall["place_pose"][:, :, 3])
+    assert away.max() < 0.05
+    seen, page = opened(file)
+    assert "the bound is about the placements" in page
+    assert seen["traces"] == 12 + 2 + 3 * len(data["stages"][data["crux"]]["scene"]["arrows"])
 
 
 def test_a_climb_is_drawn_stage_by_stage(tmp_path):

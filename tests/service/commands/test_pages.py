@@ -37,11 +37,15 @@ def test_a_page_of_a_route_needs_no_folder(capfd: pytest.CaptureFixture[str], tm
     assert page.read_text("utf-8").count('"sentence":') == found["stages"]
 
 
-def test_pages_are_of_one_route(capfd: pytest.CaptureFixture[str], tmp_path: Path):
+def test_pages_are_of_one_route_or_rock(capfd: pytest.CaptureFixture[str], tmp_path: Path):
     page = str(tmp_path / "route.html")
     for more in ([], ["--resume"], ["-o", str(tmp_path / "routes.csv")]):
         assert run_command_line(["route", "knobs", "knobs", "--html", page, *more]) == BAD_INPUT
         assert complaint(capfd).startswith("crux: --html: ")
+    ends = ["--from", "height:0.8", "--to", "height:0.8"]
+    asked = ["climb", "small-wall", *ends, "-o", str(tmp_path / "a.csv"), "--html", page]
+    assert run_command_line(asked) == BAD_INPUT
+    assert complaint(capfd).startswith("crux: --html: ")
     assert not Path(page).exists()
 
 
