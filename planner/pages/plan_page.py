@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from hand_models.base import SolverError
+from hand_models.base import CruxError
 from planner.pages.documents import write_document
 from planner.pages.plan_rows import plan_tables
 from planner.pages.scenes import Meshes, scene_data
@@ -74,11 +74,11 @@ def shown_plan(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]
 
 
 def _slice(hand: HandPlan) -> dict[str, Any]:
-    """Return the slice of a hand's wrench space; without its corners where a program fails."""
+    """Return the slice of a hand's wrench space; without corners if the space has none."""
     found: dict[str, Any] = {"limb": hand.limb, "utilisation": hand.utilisation}
     try:
         held, whole, used = wrench_slice(hand.space, hand.wrench)
-    except SolverError:
+    except CruxError:
         return found | {"held": None, "whole": [], "used": hand.wrench[[0, 2]].tolist()}
     corners = None if held is None else held.round(2).tolist()
     return found | {"held": corners, "whole": whole.round(2).tolist(), "used": used.tolist()}

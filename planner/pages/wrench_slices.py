@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,8 @@ class WrenchSlice(NamedTuple):
         Corners of the forces that can be had with the other four components of the wrench as they
         are used, counterclockwise [N]; None where there are none within the limits.
     whole : ndarray, shape (m, 2)
-        Corners of the forces that can be had with any other components: the projection [N].
+        Corners of the forces that can be had with any other components: the projection [N]; m is
+        zero for an empty space.
     used : ndarray, shape (2,)
         The force that is used [N].
     """
@@ -38,26 +39,25 @@ def wrench_slice(space: WrenchSpace, used: Array) -> WrenchSlice:
     Parameters
     ----------
     space : WrenchSpace
-        Wrench space that is not empty.
+        Of a hand.
     used : ndarray, shape (6,)
         Wrench on the rock, in H [N, N·m].
     """
     plane, others = [0, 2], [1, 3, 4, 5]
-    scaled = space.generators * WRENCH_SCALE[:, None]
     missing = ((used - space.origin) * WRENCH_SCALE)[others]
+    fixed = (space.generators * WRENCH_SCALE[:, None])[others]
+    held = _outline(space, plane, A_eq=fixed, b_eq=missing)
+    whole = _outline(space, plane)
+    return WrenchSlice(held, np.zeros((0, 2)) if whole is None else whole, used[plane])
 
-    def beside(normal: Array) -> SupportPoint | None:
+
+def _outline(space: WrenchSpace, plane: list[int], **equations: Any) -> Array | None:
+    """Return the corners, in a plane, of the wrenches whose loads meet equations; None if none."""
+
+    def touching(normal: Array) -> SupportPoint | None:
         cost = -normal @ space.generators[plane]
-        equations = {"A_eq": scaled[others], "b_eq": missing}
         loads = linear_program(cost, space.A, space.b, "slice of a wrench space", **equations)
         return None if loads is None else SupportPoint(normal, space.wrench(loads)[plane])
 
-    def beyond(normal: Array) -> SupportPoint:
-        direction = np.zeros(6)
-        direction[plane] = normal
-        return SupportPoint(normal, space.extreme(direction)[plane])
-
-    # directions that are asked for, at most
-    held, whole = enclose(beside, 32), enclose(beyond, 32)
-    corners = np.zeros((0, 2)) if whole is None else whole.inner
-    return WrenchSlice(None if held is None else held.inner, corners, used[plane])
+    found = enclose(touching, 32)  # directions at most
+    return None if found is None else found.inner

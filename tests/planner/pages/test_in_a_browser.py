@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 from base64 import b64decode
+from html import unescape
 
 import numpy as np
 import pytest
@@ -39,7 +40,8 @@ const settled = async (ready) => { while (!ready()) await new Promise((r) => set
   await settled(() => document.body.dataset.shown !== undefined);
   seen.traces = document.getElementById("scene").data.length;
   seen.drawn = document.querySelectorAll("#slices .main-svg").length > 0;
-  seen.wide = document.documentElement.scrollWidth <= innerWidth;
+  seen.hover = document.getElementById("scene").data.flatMap((trace) => trace.text ?? []);
+  seen.narrow = document.documentElement.scrollWidth <= innerWidth;
   const column = () => [...document.querySelectorAll("#tables tbody")].at(0).rows;
   document.querySelectorAll("#tables th button")[1].click();
   seen.sorted = [...column()].map((row) => Number(row.cells[1].textContent));
@@ -72,7 +74,8 @@ def opened(file, steps=""):
     )  # fmt: skip
     console = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
     assert [line for line in console if re.search("error|uncaught", line, re.IGNORECASE)] == []
-    return json.loads(re.search(r'<pre id="seen">(.*?)</pre>', done.stdout)[1]), done.stdout
+    found = re.search(r'<pre id="seen">(.*?)</pre>', done.stdout)[1]
+    return json.loads(unescape(found)), done.stdout
 
 
 def test_a_plan_is_drawn_and_its_tables_sort(tmp_path):
@@ -82,7 +85,13 @@ def test_a_plan_is_drawn_and_its_tables_sort(tmp_path):
     assert plan.reason in page
     assert "<canvas" in page
     assert seen["drawn"]
-    assert seen["wide"]
+    assert seen["narrow"]
+    for hand in plan.hands:
+        for tile, (shear, normal, _) in zip(hand.tiles, hand.loads, strict=True):
+            told = f"shear {shear:.1f} N, normal {normal:.1f} N".replace("-0.0", "-?0.0")
+            name = f"{hand.limb}, {tile.finger}, {tile.phalanx}<br>".replace("_", " ")
+            found = any(name in text and re.search(told, text) for text in seen["hover"])
+            assert found == (tile.contact != "none")
     # of rock, palms, body, links, lines, dots, tiles; and three for each force
     assert seen["traces"] == 12 + 3 * (len(plan.hands) + 1)
     used = sorted((round(hand.utilisation, 2) for hand in plan.hands), reverse=True)

@@ -6,6 +6,7 @@ import json
 import re
 import sys
 from base64 import b64decode
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -188,6 +189,17 @@ def test_beyond_the_limits_there_is_no_slice():
     found = wrench_slice(space(L, np.full(12, 2.0)), np.array([0.0, 0.0, 0.0, 0.0, 3.0, 0.0]))
     assert found.held is None
     assert len(found.whole) == 4
+
+
+def test_a_hand_that_can_exert_nothing_is_shown_without_outlines(tmp_path):
+    question, plan = answered("plain")
+    nothing = space(np.vstack([np.eye(6), -np.eye(6)]), np.full(12, 2.0))
+    nothing = replace(nothing, l0=np.full(12, 3.0))
+    hands = (replace(plan.hands[0], space=nothing), *plan.hands[1:])
+    write_plan_page(replace(plan, hands=hands), question, tmp_path / "plan.html", "a wall")
+    (stage,) = data_of((tmp_path / "plan.html").read_text("utf-8"))["stages"]
+    assert (stage["slices"][0]["held"], stage["slices"][0]["whole"]) == (None, [])
+    assert all(len(each["whole"]) > 2 for each in stage["slices"][1:])
 
 
 def test_corners_of_a_plans_slices_are_wrenches_that_the_hand_can_exert():
