@@ -267,13 +267,13 @@ function showWords(stage) {
 async function show(ranges, view) {
   const stage = data.stages[at];
   showWords(stage);
-  drawSlices(stage.slices ?? []);
   if (data.stages.length > 1) {
     byId("stage").value = at;
     byId("where").textContent = `stage ${at} of ${data.stages.length - 1}: ${stage.name}` + (at === data.crux ? ", the crux" : "");
     await drawMargin();
   }
   await drawScene(ranges, view);
+  drawSlices(stage.slices ?? []);
   document.body.dataset.shown = at;
 }
 
