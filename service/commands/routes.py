@@ -74,9 +74,8 @@ def route_command(
     if index is not None:
         return _stage(_Asked.of(routes, wanted, own), index, output, page, own, as_json)
     if output is None and page is None:
-        raise InvalidInputError(
-            "missing: give -o DIR, or --html FILE or --stage K of one route", field="-o"
-        )
+        lack = "missing: give -o DIR, --html FILE, or --stage K of one route"
+        raise InvalidInputError(lack, field="-o")
     listing = climbs.route_listing()
     several = len(routes) > 1 or stances.is_folder(routes[0])
     if output is None and (several or resume):

@@ -102,7 +102,7 @@ def test_one_stage_is_shown_as_crux_plan_shows_it_and_written(written, tmp_path,
     assert run_command_line(["route", route, route, "--stage", "1"]) == BAD_INPUT
     assert "is for one route" in complaint(capfd)
     assert run_command_line(["route", route]) == BAD_INPUT
-    assert "give -o DIR, or --stage K" in complaint(capfd)
+    assert "give -o DIR, --html FILE, or --stage K" in complaint(capfd)
 
 
 @pytest.mark.usefixtures("blank_pictures")
