@@ -35,6 +35,7 @@ from benchmarks.load.asking import (
 )
 from benchmarks.load.bulk import bulk, memory_of
 from benchmarks.load.others import climb, climbed, greedy, process, starve, starved, unread
+from benchmarks.load.published import echo_published, published_table
 from benchmarks.load.slips import slips_table
 from hand_models.base import stores
 from planner import processes as proc
@@ -189,6 +190,23 @@ def slips(count: int) -> None:
             server.endpoint, Client(where), ECHO, count, lambda: other("ask", server.endpoint)
         )
     console.print(table)
+
+
+@main.command()
+@click.argument("endpoint")
+def echo_wrenches(endpoint: str) -> None:
+    """Publish for each message as many bytes as set-points have, until killed."""
+    echo_published(endpoint)
+
+
+@main.command()
+@click.option("--seconds", default=10.0, show_default=True)
+@click.option("--rate", default=1000.0, show_default=True, help="Wrenches a second.")
+def published(seconds: float, rate: float) -> None:
+    """Publish wrenches at a rate, and messages to a bare echo; how old the answers are."""
+    where = free_endpoint()
+    with served() as server, other("echo-wrenches", where):
+        console.print(published_table(server.endpoint, where, seconds, rate))
 
 
 @main.command()

@@ -41,7 +41,16 @@ ROOMS = {
         "deadline",
         "pictures",
     ),
-    "service": ("requests", "replies", "serving", "processes", "bulk", "sweeping", "wire"),
+    "service": (
+        "requests",
+        "replies",
+        "serving",
+        "publishing",
+        "processes",
+        "bulk",
+        "sweeping",
+        "wire",
+    ),
 }
 """Rooms that a caller imports from; the others are told of in the page on the architecture."""
 

@@ -33,6 +33,7 @@ from service.requests import (
     RouteRequest,
     SetPointsRequest,
     StreamRequest,
+    WrenchRequest,
     WrenchSpaceRequest,
 )
 from service.wire import (
@@ -236,6 +237,7 @@ def handle(
     streams: Streams = LOCAL_STREAMS,
     files: MeshFiles | None = None,
     revised: Callable[[Any], Any] | None = None,
+    stream: str | None = None,
     send: Callable[[Answer], None] | None = None,
 ) -> Answer:
     """Answer one query: decode the request, dispatch it to its handler, and encode the reply.
@@ -265,6 +267,8 @@ def handle(
         Reader of the mesh files that a plan request may name. By default such a request is refused.
     revised : callable, optional
         Maps the decoded request to the request that is answered in its place.
+    stream : str, optional
+        Stream on which the payload was published; it is then a `WrenchRequest`.
     send : callable, optional
         Takes parts of the answer, each an encoded reply that is not the last. By default the answer
         is whole, also where the request asks for parts.
@@ -294,8 +298,10 @@ def handle(
         form = Format.named(encoding)
         name = key.rpartition("/")[2]
         service = SERVICES_BY_NAME[name]
-        kind = service.request
+        kind = service.request if stream is None else WrenchRequest
         request: Any = decode_request(payload, kind, form)
+        if stream is not None:
+            request = request.asked(stream)
         if files is not None:
             request = files.whole(request)
         if revised is not None:

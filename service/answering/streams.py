@@ -170,6 +170,11 @@ class Streams:
     def __len__(self) -> int:
         return len(self._kept)
 
+    def names(self) -> tuple[str, ...]:
+        """Return the identifiers of all streams of all clients."""
+        with self._lock:
+            return tuple(self._kept)
+
     def set_points(self, request: SetPointsRequest) -> SetPointsReply:
         """Return the tendon tensions of all hands for a body wrench, from a declared stream.
 

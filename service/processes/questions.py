@@ -37,6 +37,8 @@ class Job(NamedTuple):
         True if a stream that the query declares must be released again.
     client : str
         Client that asks; each client owns the streams that it declares.
+    stream : str or None
+        Stream on which the payload was published as a wrench; None for queries.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Job(NamedTuple):
     seconds: float | None = None
     rehearsal: bool = False
     client: str = ""
+    stream: str | None = None
 
 
 def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[[Job], Answer]:
@@ -93,8 +96,11 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
                 robots,
                 started=arrived,
                 streams=asked,
+                stream=job.stream,
                 send=send_part,
             )
+        if job.name == ServiceName.STREAM and not job.rehearsal:
+            found = found._replace(streams=streams.names())
         cost = time.thread_time() - begun
         return found._replace(seconds=time.perf_counter() - start, cost=cost)
 

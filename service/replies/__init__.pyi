@@ -43,6 +43,7 @@ from .reply import (
 )
 from .set_points import (
     HandColumns as HandColumns,
+    PublishedReply as PublishedReply,
     ReleasedFinger as ReleasedFinger,
     SetPointsReply as SetPointsReply,
     StreamReply as StreamReply,

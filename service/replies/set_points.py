@@ -6,9 +6,9 @@ from msgspec import UNSET, Struct, UnsetType
 
 from planner import LostTile
 from service.replies.plan import HandSetPoints
-from service.replies.reply import Reply, StanceReply, Vector
+from service.replies.reply import ErrorDetail, Reply, StanceReply, Vector
 
-__all__ = ["HandColumns", "ReleasedFinger", "SetPointsReply", "StreamReply"]
+__all__ = ["HandColumns", "PublishedReply", "ReleasedFinger", "SetPointsReply", "StreamReply"]
 
 
 class HandColumns(Struct, kw_only=True):
@@ -27,7 +27,8 @@ class StreamReply(StanceReply, kw_only=True):
 
     The service keeps a stream until many others are declared, or until the service ends.
 
-    - ``stream``: identifier of the stream, for requests of set-points.
+    - ``stream``: identifier of the stream, for requests of set-points, and in the keys at which
+      wrenches are published.
     - ``radius``: distance from ``body_wrench`` within which set-points are interpolated between
       plans [N], along a moment a tenth of it per metre [N·m]; null where each set-point is solved
       for.
@@ -100,3 +101,27 @@ class SetPointsReply(Reply, kw_only=True):
     lost: list[LostTile] | UnsetType = UNSET
     released: list[ReleasedFinger] | UnsetType = UNSET
     save_first: str | UnsetType | None = UNSET
+
+
+class PublishedReply(Struct, kw_only=True):
+    """Set-points for a wrench that a client has published, or why there are none: published, too.
+
+    - ``v``: version of the messages, 1.
+    - ``stream``: identifier of the stream.
+    - ``number``, ``time``: as of the wrench; null where they could not be read.
+    - ``age``: time from the arrival of the wrench until its set-points were sent [s].
+    - ``skipped``: number of wrenches of the stream that came after the one answered before, and
+      that have no answer, because this one was newer.
+    - ``set_points``: the set-points, with their ``gap``; null where there is an error.
+    - ``error``: why there are no set-points; null where there are. If its ``field`` is ``stream``,
+      no such stream is kept: declare it again.
+    """
+
+    v: int = 1
+    stream: str
+    number: int | None
+    time: float | None
+    age: float
+    skipped: int
+    set_points: SetPointsReply | None = None
+    error: ErrorDetail | None = None

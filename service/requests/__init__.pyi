@@ -22,14 +22,11 @@ from .questions import (
     BodySpaceRequest as BodySpaceRequest,
     DiagnosisRequest as DiagnosisRequest,
     Draw as Draw,
-    LostTiles as LostTiles,
     Move as Move,
     PlanRequest as PlanRequest,
     PlanWant as PlanWant,
     RouteRequest as RouteRequest,
-    SetPointsRequest as SetPointsRequest,
     SpaceWant as SpaceWant,
-    StreamRequest as StreamRequest,
     WrenchSpaceRequest as WrenchSpaceRequest,
 )
 from .request import (
@@ -47,3 +44,9 @@ from .request import (
     Wrench as Wrench,
 )
 from .stance import Hand as Hand, Place as Place, Stance as Stance
+from .streams import (
+    LostTiles as LostTiles,
+    SetPointsRequest as SetPointsRequest,
+    StreamRequest as StreamRequest,
+    WrenchRequest as WrenchRequest,
+)

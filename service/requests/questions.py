@@ -15,7 +15,6 @@ from planner import (
     BodyRange,
     Limits,
     Load,
-    LostTile,
     Objective,
     OpenLoopSettings,
     SurvivalSettings,
@@ -38,15 +37,12 @@ __all__ = [
     "BodySpaceRequest",
     "DiagnosisRequest",
     "Draw",
-    "LostTiles",
     "Move",
     "ObjectiveName",
     "PlanRequest",
     "PlanWant",
     "RouteRequest",
-    "SetPointsRequest",
     "SpaceWant",
-    "StreamRequest",
     "WrenchSpaceRequest",
 ]
 
@@ -68,20 +64,9 @@ Axis = Literal["fx", "fy", "fz", "mx", "my", "mz"]
 Direction = tuple[Coordinate, Coordinate, Coordinate]
 PlanWant = Literal[Want, "com_region", "redundancy", "survival"]
 SpaceWant = Literal["robust", "half_spaces", "vertices", "opening"]
-Radius = Annotated[
-    float,
-    Meta(
-        gt=0.0,
-        le=1e4,
-        description="of an interpolation, along a force; along a moment a tenth, per metre [N]",
-    ),
-]
 Currents = Annotated[list[Annotated[float, Meta(ge=0.0, le=1e3)]], Meta(min_length=4, max_length=4)]
 Turns = Annotated[list[Annotated[float, Meta(ge=-1e3, le=1e3)]], Meta(min_length=4, max_length=4)]
 Tolerance = Annotated[float, Meta(ge=0.001, le=1.0)]
-
-
-LostTiles = Annotated[list[LostTile], Meta(max_length=1000, description="tiles that have slipped")]
 
 
 class Draw(Strict, frozen=True, kw_only=True):
@@ -285,50 +270,6 @@ class BodySpaceRequest(Query, frozen=True, kw_only=True):
             description="along which the largest acceleration is wanted, in W: one program each",
         ),
     ] = []
-
-
-class StreamRequest(Query, frozen=True, kw_only=True):
-    """Request that declares a stance as a stream, for set-points of many body wrenches.
-
-    All wrists of the stance must be fixed or compliant.
-
-    - ``stance``: poses of body and hands, and their holds.
-    - ``body_wrench``: centre of the first interpolation, in B [N, N·m]; give it or ``load``, not
-      both.
-    - ``load``: mass, acceleration and payloads from which the body wrench follows; by default the
-      robot's weight at rest.
-    - ``limits``: the cap on the utilisation, and the caller's own limits.
-    - ``radius``: distance from the centre within which set-points are interpolated between plans
-      [N]; along a moment a tenth of it per metre [N·m]. Without meaning for compliant wrists, whose
-      set-points are solved one by one.
-    - ``lost``: tiles that have slipped before; fixed wrists only.
-    """
-
-    stance: Stance
-    body_wrench: Annotated[Wrench | None, Meta(description="the first centre, in B; or load")] = (
-        None
-    )
-    load: Load | None = None
-    limits: Limits = Limits()
-    radius: Radius = 30.0
-    lost: LostTiles = []
-
-
-class SetPointsRequest(Query, frozen=True, kw_only=True):
-    """Request for the set-points of one body wrench, from a declared stream.
-
-    - ``stream``: identifier in the reply to the stream's declaration.
-    - ``body_wrench``: wrench that the rock must exert on the robot, in B [N, N·m].
-    - ``detail``: ``set_points`` leaves out torques, currents and wrenches; ``hands`` and ``full``
-      are the same.
-    - ``lost``: all tiles that have slipped, besides those of the declaration: the set-points do
-      without them. Fixed wrists only.
-    """
-
-    stream: Annotated[Name, Meta(description="as the reply to its declaration names it")]
-    body_wrench: Annotated[Wrench, Meta(description="that the rock must exert on the robot, in B")]
-    detail: Detail | None = None
-    lost: LostTiles = []
 
 
 class Move(Hand, frozen=True, kw_only=True):

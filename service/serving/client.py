@@ -7,8 +7,9 @@ import time
 import uuid
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from queue import SimpleQueue
-from typing import Self, TypeVar
+from typing import Self
 
 import msgspec
 import zenoh
@@ -16,6 +17,7 @@ from msgspec import UNSET
 from zenoh.handlers import Callback
 
 from hand_models.base import CruxError, InvalidInputError
+from service.publishing import PublishedStream
 from service.replies import (
     BodySpaceReply,
     BriefPlanReply,
@@ -25,7 +27,6 @@ from service.replies import (
     ErrorReply,
     PartReply,
     PlanReply,
-    Reply,
     RouteReply,
     SetPointsReply,
     StreamReply,
@@ -51,18 +52,17 @@ from service.serving.settings import SERVING_SETTINGS
 from service.wire import (
     DEFAULT_ROBOT,
     Format,
-    MalformedError,
     NoServiceError,
     ServiceError,
     ServiceName,
     ServiceTimeout,
     check_size,
+    read_reply,
     service_key,
 )
 
 __all__ = ["CruxClient"]
 
-ReplyT = TypeVar("ReplyT", bound=Reply)
 Parts = Callable[[PartReply], None]
 
 
@@ -84,7 +84,7 @@ class CruxClient:
         that is longer. A request without ``deadline`` is sent with a deadline of nine tenths of the
         timeout.
     form : Format, optional
-        Encoding of the messages: MessagePack or JSON.
+        Encoding of the messages.
     wait : float, optional
         Longest wait for a service to appear, counted from this call [s]. Without it, the service
         must already run when the first request is sent.
@@ -198,22 +198,22 @@ class CruxClient:
         """
         received = self._ask(ServiceName.PLAN, request)
         if Format.is_labelled(str(received.encoding), BriefPlanReply):
-            return _read(received, BriefPlanReply)
-        return _read(received, PlanReply)
+            return read_reply(received, BriefPlanReply)
+        return read_reply(received, PlanReply)
 
     def wrench_space(self, request: WrenchSpaceRequest) -> WrenchSpaceReply:
         """Send a request for one hand's wrench space and return the reply.
 
         Raises the errors that `plan` raises.
         """
-        return _read(self._ask(ServiceName.WRENCH_SPACE, request), WrenchSpaceReply)
+        return read_reply(self._ask(ServiceName.WRENCH_SPACE, request), WrenchSpaceReply)
 
     def body_space(self, request: BodySpaceRequest) -> BodySpaceReply:
         """Send a request for a stance's body space and return the reply.
 
         Raises the errors that `plan` raises.
         """
-        return _read(self._ask(ServiceName.BODY_SPACE, request), BodySpaceReply)
+        return read_reply(self._ask(ServiceName.BODY_SPACE, request), BodySpaceReply)
 
     def route(self, request: RouteRequest, parts: Parts | None = None) -> RouteReply:
         """Send a request for a climb and return its stages, and the trajectory if it is wanted.
@@ -232,7 +232,7 @@ class CruxClient:
         """
         if parts is not None:
             request = msgspec.structs.replace(request, parts=True)
-        return _read(self._ask(ServiceName.ROUTE, request, parts), RouteReply)
+        return read_reply(self._ask(ServiceName.ROUTE, request, parts), RouteReply)
 
     def climb(self, request: ClimbRequest, parts: Parts | None = None) -> ClimbReply:
         """Search for the best climb on a rock and return it, with a bound of every other.
@@ -259,7 +259,7 @@ class CruxClient:
         identifier = request.id or uuid.uuid4().hex
         request = msgspec.structs.replace(request, id=identifier)
         try:
-            return _read(self._ask(ServiceName.CLIMB, request, parts), ClimbReply)
+            return read_reply(self._ask(ServiceName.CLIMB, request, parts), ClimbReply)
         except CruxError:
             raise
         except BaseException:
@@ -283,28 +283,36 @@ class CruxClient:
         """
         request = CancelRequest(v=1, id=identifier)
         waits = self.timeout or SERVING_SETTINGS.client_timeout
-        return _read(self._answer(ServiceName.CANCEL, request, waits), CancelReply).cancelled
+        return read_reply(self._answer(ServiceName.CANCEL, request, waits), CancelReply).cancelled
 
     def stream(self, request: StreamRequest) -> StreamReply:
         """Declare a stance as a stream of body wrenches; the reply has the stream's identifier.
 
         Raises the errors that `plan` raises.
         """
-        return _read(self._ask(ServiceName.STREAM, request), StreamReply)
+        return read_reply(self._ask(ServiceName.STREAM, request), StreamReply)
+
+    def publish_stream(self, request: StreamRequest) -> PublishedStream:
+        """Declare a stream as `stream` does, to publish its wrenches; it takes up again by itself.
+
+        Raises the errors that `plan` raises.
+        """
+        declare, identity = partial(self.stream, request), self._identity
+        return PublishedStream(self._session, self.robot, declare, self.form, identity)
 
     def set_points(self, request: SetPointsRequest) -> SetPointsReply:
         """Ask a declared stream for the set-points of one body wrench and return the reply.
 
         Raises the errors that `plan` raises.
         """
-        return _read(self._ask(ServiceName.SET_POINTS, request), SetPointsReply)
+        return read_reply(self._ask(ServiceName.SET_POINTS, request), SetPointsReply)
 
     def diagnosis(self, request: DiagnosisRequest) -> DiagnosisReply:
         """Ask which tile has probably slipped, by the data of motors, and return the reply.
 
         Raises the errors that `plan` raises.
         """
-        return _read(self._ask(ServiceName.DIAGNOSIS, request), DiagnosisReply)
+        return read_reply(self._ask(ServiceName.DIAGNOSIS, request), DiagnosisReply)
 
     def _ask(self, name: str, request: Query, parts: Parts | None = None) -> zenoh.Sample:
         """Return the reply that is no error; raise what `plan` raises."""
@@ -340,7 +348,7 @@ class CruxClient:
             raise ServiceTimeout(
                 f"no answer at {key} within {waits:g} s; wait longer (timeout, --timeout)"
             )
-        detail = _read(reply.err, ErrorReply).error
+        detail = read_reply(reply.err, ErrorReply).error
         raise ServiceError(
             detail.kind,
             detail.message,
@@ -380,7 +388,7 @@ class CruxClient:
                 return reply
             else:
                 server = str(reply.replier_id)
-                parts(_read(reply.ok, PartReply))
+                parts(read_reply(reply.ok, PartReply))
         if server is not None and error is None:
             raise NoServiceError(f"the service at {key} ended before it had answered; ask again")
         return error
@@ -388,13 +396,3 @@ class CruxClient:
 
 def _how_to_start() -> str:
     return "start a service with `crux serve` where this session reaches it"
-
-
-def _read(received: zenoh.Sample | zenoh.ReplyError, kind: type[ReplyT]) -> ReplyT:
-    try:
-        return Format.named(str(received.encoding)).decode(received.payload.to_bytes(), kind)
-    except (MalformedError, msgspec.ValidationError) as error:
-        raise ServiceError(
-            "internal",
-            f"the reply is not a {kind.__name__} ({error}): run client and service of one version",
-        ) from None

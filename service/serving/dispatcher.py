@@ -29,7 +29,7 @@ from service.requests import CancelRequest
 from service.serving.inbox import Inbox
 from service.serving.monitor import ServiceMonitor, ServiceState
 from service.serving.names import ClientNames
-from service.serving.question import PendingQuestion, client_of, received_question
+from service.serving.question import AnyQuery, PendingQuestion, client_of, received_question
 from service.serving.reply_sender import Replies, SharedQueue, reply_to
 from service.serving.settings import SERVING_SETTINGS
 from service.serving.shares import Shares
@@ -105,7 +105,7 @@ class Dispatcher:
                 "standard error of this process say why"
             )
 
-    def ask(self, query: zenoh.Query, key: str) -> None:
+    def ask(self, query: AnyQuery, key: str) -> None:
         """Put a query, which arrived at a key, into its queue; returns at once."""
         self._inbox.post(partial(self._admit, query, key, time.perf_counter()))
 
@@ -211,7 +211,7 @@ class Dispatcher:
 
     # questions -----------------------------------------------------------------------------------
 
-    def _admit(self, query: zenoh.Query, key: str, arrived: float) -> None:
+    def _admit(self, query: AnyQuery, key: str, arrived: float) -> None:
         try:
             question = received_question(query, key, arrived, self._seconds)
         except Exception:
@@ -306,7 +306,7 @@ class Dispatcher:
 
     def _take_back(self, lane: PriorityLane[Job, Answer]) -> None:
         try:
-            done = lane.take()
+            done = self._pool.take(lane)
         except EOFError:
             rest = "nothing else was lost with it"
             if self._pool.has_streams(lane):

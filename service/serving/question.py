@@ -11,6 +11,7 @@ import zenoh
 from hand_models.base import CruxError, LimitError
 from service.answering import SERVICES_BY_NAME
 from service.processes import Job
+from service.publishing import PublishedWrench
 from service.requests import LEAST_REPLY_BYTES, LONGEST_DEADLINE, CancelRequest
 from service.serving.settings import SERVING_SETTINGS
 from service.wire import (
@@ -23,7 +24,10 @@ from service.wire import (
     encode_error,
 )
 
-__all__ = ["PendingQuestion", "client_of", "received_question"]
+__all__ = ["AnyQuery", "PendingQuestion", "client_of", "received_question"]
+
+AnyQuery = zenoh.Query | PublishedWrench
+"""What is answered: a query, or a published wrench, whose answer is published."""
 
 
 class _Head(msgspec.Struct):
@@ -45,8 +49,8 @@ class PendingQuestion:
 
     Attributes
     ----------
-    query : zenoh.Query
-        The zenoh query, which gets exactly one last reply, and before it parts if it asks for them.
+    query : zenoh.Query or PublishedWrench
+        The query, which gets exactly one last reply, and before it parts if it asks for them.
     key : str
         Key at which the query arrived.
     name : str
@@ -86,7 +90,7 @@ class PendingQuestion:
         Time at which a worker got the question; negative before.
     """
 
-    query: zenoh.Query
+    query: AnyQuery
     key: str
     name: str
     client: str
@@ -124,7 +128,7 @@ class PendingQuestion:
         return encode_error(error, self.form, self.id, most=self.most)
 
     def job(self, now: float, rehearsal: bool) -> Job:
-        """Return the question as a job for a worker.
+        """Return the question as a job for a worker; of a stream's wrenches, with the newest.
 
         Parameters
         ----------
@@ -133,20 +137,25 @@ class PendingQuestion:
         rehearsal : bool
             True if the worker must release a stream again that it has declared.
         """
+        stream = None
+        if isinstance(self.query, PublishedWrench):
+            stream, newest = self.query.stream, self.query.begin()
+            self.payload, self.encoding = newest.payload.to_bytes(), str(newest.encoding)
+            self.arrived = self.query.arrived
         waited = now - self.arrived
         encoding, seconds = self.encoding, self.seconds
-        return Job(self.name, self.payload, encoding, waited, seconds, rehearsal, self.place)
+        return Job(
+            self.name, self.payload, encoding, waited, seconds, rehearsal, self.place, stream
+        )
 
 
-def client_of(query: zenoh.Query) -> str:
+def client_of(query: AnyQuery) -> str:
     """Return the session identifier of a query's client; empty where the query has none."""
     source = query.source_info
     return "" if source is None else str(source.source_id.zid)
 
 
-def received_question(
-    query: zenoh.Query, key: str, arrived: float, longest: float
-) -> PendingQuestion:
+def received_question(query: AnyQuery, key: str, arrived: float, longest: float) -> PendingQuestion:
     """Return a query as a pending question, with its payload copied and its main fields read.
 
     Payloads above 1 MiB are not decoded here, except for climbs; a worker reads them. A payload or
@@ -154,10 +163,10 @@ def received_question(
 
     Parameters
     ----------
-    query : zenoh.Query
+    query : zenoh.Query or PublishedWrench
         The query.
     key : str
-        Key at which the query arrived.
+        Key at which the query arrived; of a wrench, where its set-points are published.
     arrived : float
         Time of arrival on the clock of `time.perf_counter` [s].
     longest : float
@@ -195,7 +204,11 @@ def received_question(
         or len(payload) > SERVING_SETTINGS.large_payload,
         fault=fault,
         secret=secret,
+        # a client that reads no set-points may read replies
+        replies_by=key if isinstance(query, PublishedWrench) else "",
     )
+    if isinstance(query, PublishedWrench):
+        return question
     # a process reads larger ones; of a climb the deadline must be known: a scan takes 1 ms a MB
     if len(payload) <= 2**20 or name == ServiceName.CLIMB:
         _read(question)

@@ -15,11 +15,9 @@ from enum import StrEnum
 from functools import partial
 from queue import SimpleQueue
 
-import zenoh
-
 from hand_models.base import CruxError
 from service.serving.monitor import ServiceMonitor
-from service.serving.question import PendingQuestion
+from service.serving.question import AnyQuery, PendingQuestion
 from service.wire import Answer, BusyError, Format, encode_error
 
 __all__ = ["Replies", "ReplySender", "SharedQueue", "reply_to"]
@@ -103,12 +101,12 @@ class ReplySender:
             return None
 
 
-def reply_to(query: zenoh.Query, key: str, make_answer: Callable[[], Answer]) -> None:
+def reply_to(query: AnyQuery, key: str, make_answer: Callable[[], Answer]) -> None:
     """Send the reply to a query, and drop the query.
 
     Parameters
     ----------
-    query : zenoh.Query
+    query : zenoh.Query or PublishedWrench
         The query.
     key : str
         Key under which the reply is sent.
@@ -190,7 +188,7 @@ class Replies:
         """Refuse a question as busy because the service is shutting down; retry after 10 s."""
         self.refuse(question, BusyError("the service is shutting down", self._longest_retry))
 
-    def unread(self, query: zenoh.Query, key: str) -> None:
+    def unread(self, query: AnyQuery, key: str) -> None:
         """Reply to a query that could not be read, for an unknown cause."""
         unread = CruxError("the service could not read the query; see its log")
         answer = encode_error(unread, Format.JSON, kind="internal")

@@ -18,6 +18,7 @@ from hand_models.parameters import ParameterTable
 from planner import Make, RobotFile, cores
 from service.answering import SERVICES_BY_NAME, robots_of
 from service.processes import Job, answering
+from service.publishing import PublishedWrenches
 from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
 from service.serving.config import close_at_once
 from service.serving.dispatcher import Dispatcher
@@ -99,7 +100,8 @@ class PlanService:
         self._alive = service_key(self.robot, ServiceName.ALIVE)
         self._session = session
         made = make or partial(answering, robot, hand)
-        pool = WorkerPool(made, count, memory)
+        self._wrenches = PublishedWrenches(session, self.robot)
+        pool = WorkerPool(made, count, memory, self._wrenches.keep)
         self._dispatcher = Dispatcher(pool, seconds, self.robot, self._inquire)
         self._monitor = self._dispatcher.monitor
         self._open = ExitStack()
@@ -143,6 +145,8 @@ class PlanService:
         health, metrics = self.operators
         for key, make_answer in ((health, self._monitor.health), (metrics, self._monitor.metrics)):
             self._declare(key, partial(self._dispatcher.look, make_answer))
+        self._open.callback(self._wrenches.close)
+        self._wrenches.take(self._dispatcher.ask)
         # clients in this process need no link
         self._dispatcher.linked(str(self._session.info.zid()))
         links, info = Callback(self._transport, indirect=False), self._session.info

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from multiprocessing.connection import Connection
 from typing import Literal
 
@@ -34,6 +34,8 @@ class WorkerPool:
         Number of workers that answer questions.
     memory : int
         Largest memory of each worker [bytes].
+    keeps : callable, optional
+        Called with the identifiers of all streams that are kept, whenever that changes.
 
     Attributes
     ----------
@@ -51,8 +53,14 @@ class WorkerPool:
         Time that the last worker took to become ready [s]; zero before there is any.
     """
 
-    def __init__(self, make: Make[Job, Answer], workers: int, memory: int) -> None:
-        self._make, self.workers, self._memory = make, workers, memory
+    def __init__(
+        self,
+        make: Make[Job, Answer],
+        workers: int,
+        memory: int,
+        keeps: Callable[[Iterable[str]], None] = lambda _: None,
+    ) -> None:
+        self._make, self.workers, self._memory, self._keeps = make, workers, memory, keeps
         self.climbs = max(1, workers // 2)
         self.work: dict[PriorityLane[Job, Answer], PendingQuestion | None] = {}
         self.rests_until = 0.0
@@ -133,6 +141,19 @@ class WorkerPool:
         self.rests_until = time.perf_counter() + rest
         self.failed_starts += 1
         return rest
+
+    def take(self, lane: PriorityLane[Job, Answer]) -> Answer | None:
+        """Return what a lane's worker has sent; None where it has become ready.
+
+        Raises
+        ------
+        EOFError
+            If the worker has ended.
+        """
+        done = lane.take()
+        if done is not None and done.streams is not None:
+            self._keeps(done.streams)
+        return done
 
     def has_streams(self, lane: PriorityLane[Job, Answer]) -> bool:
         """Return whether a lane belongs to the worker that keeps the streams."""
@@ -215,6 +236,8 @@ class WorkerPool:
             Questions that the worker had and that have no reply yet.
         """
         asked = [self.work.pop(lane, None) for lane in handle.lanes]
+        if self._purposes[handle] == "streams":
+            self._keeps(())
         self._starting.pop(handle, None)
         del self._purposes[handle]
         if handle.ready:

@@ -1,13 +1,10 @@
 from .codec import (
     LARGEST_ERROR as LARGEST_ERROR,
-    LARGEST_REQUEST as LARGEST_REQUEST,
     Answer as Answer,
     Format as Format,
-    check_size as check_size,
     decode_request as decode_request,
     encode_error as encode_error,
     identifier as identifier,
-    most_bytes as most_bytes,
     most_error_bytes as most_error_bytes,
 )
 from .errors import (
@@ -25,6 +22,13 @@ from .keys import (
     DEFAULT_ROBOT as DEFAULT_ROBOT,
     ServiceName as ServiceName,
     service_key as service_key,
+    stream_key as stream_key,
+)
+from .reading import read_reply as read_reply
+from .sizes import (
+    LARGEST_REQUEST as LARGEST_REQUEST,
+    check_size as check_size,
+    most_bytes as most_bytes,
 )
 from .validation_errors import (
     PossibleType as PossibleType,

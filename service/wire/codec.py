@@ -11,30 +11,25 @@ from typing import Any, Final, NamedTuple, TypeVar
 
 import msgspec
 
-from hand_models.base import CruxError, InvalidInputError, LimitError, UnsupportedError
+from hand_models.base import CruxError, InvalidInputError, UnsupportedError
 from service.replies import ErrorDetail, ErrorReply
-from service.requests import CancelRequest, Identifier, ReplyBytes, SetPointsRequest, StreamRequest
+from service.requests import Identifier, ReplyBytes
 from service.wire.duplicate_keys import refuse_in_json, refuse_in_msgpack
 from service.wire.errors import BusyError, MalformedError
+from service.wire.sizes import LARGEST_REQUEST, check_size, most_bytes
 from service.wire.validation_errors import validation_error
 
 __all__ = [
     "LARGEST_ERROR",
-    "LARGEST_REQUEST",
     "Answer",
     "Format",
-    "check_size",
     "decode_request",
     "encode_error",
     "identifier",
-    "most_bytes",
     "most_error_bytes",
 ]
 
 MessageT = TypeVar("MessageT")
-
-LARGEST_REQUEST: Final = 2**26
-"""Maximum bytes of a request: a stance has some thousand, a scan of 200,000 triangles about 10⁷."""
 
 LARGEST_ERROR: Final = 4096
 """Maximum bytes of an error reply."""
@@ -152,6 +147,8 @@ class Answer(NamedTuple):
         Processor time that the answer took [s]; other programs on the machine do not change it.
     last : bool
         False for a part of the answer, which more replies to the query follow.
+    streams : tuple of str or None
+        Streams that are kept once one has been declared; None for other answers.
     """
 
     payload: bytes
@@ -161,6 +158,7 @@ class Answer(NamedTuple):
     seconds: float = 0.0
     cost: float = 0.0
     last: bool = True
+    streams: tuple[str, ...] | None = None
 
 
 def decode_request(payload: bytes, kind: type[MessageT], form: Format = Format.JSON) -> MessageT:
@@ -247,40 +245,6 @@ def _parts(value: object) -> Iterator[tuple[str, object]]:
     elif isinstance(value, Mapping):
         for key, part in value.items():
             yield str(key), part
-
-
-def most_bytes(kind: type) -> int:
-    """Return the maximum bytes of a request of a given type; larger payloads are not decoded."""
-    if kind is SetPointsRequest or kind is CancelRequest:
-        return 2**12  # they have no rock
-    if kind is StreamRequest:
-        return 2**24  # streams are kept: sixteen of them have to fit into one process
-    return LARGEST_REQUEST
-
-
-def check_size(size: int, kind: type) -> None:
-    """Raise an error for a payload that is larger than its request type allows.
-
-    Parameters
-    ----------
-    size : int
-        Of the payload [bytes].
-    kind : type
-
-    Raises
-    ------
-    LimitError
-        If the payload has more bytes than `most_bytes` of the type.
-    """
-    most = most_bytes(kind)
-    if size > most:
-        advice = (
-            "ask for one body wrench at a time, with a shorter id"
-            if kind is SetPointsRequest
-            else "let hands share a scan under stance.rocks, cut it to what is near them, or make "
-            "its triangles larger (crux rock --spacing)"
-        )
-        raise LimitError(f"{size} bytes; a {kind.__name__} may have {most} at most: {advice}")
 
 
 def _plain(payload: bytes, form: Format) -> Any:

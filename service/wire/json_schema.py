@@ -19,6 +19,7 @@ from service.replies import (
     HealthReply,
     PartReply,
     PlanReply,
+    PublishedReply,
     RouteReply,
     SetPointsReply,
     StreamReply,
@@ -33,10 +34,11 @@ from service.requests import (
     RouteRequest,
     SetPointsRequest,
     StreamRequest,
+    WrenchRequest,
     WrenchSpaceRequest,
 )
 from service.wire.codec import LATER_FIELDS
-from service.wire.keys import ServiceName, service_key
+from service.wire.keys import ServiceName, service_key, stream_key
 
 __all__ = ["MESSAGE_KINDS", "part_name", "schema"]
 
@@ -52,6 +54,8 @@ MESSAGE_KINDS: Final[tuple[type[msgspec.Struct], ...]] = (
     StreamReply,
     SetPointsRequest,
     SetPointsReply,
+    WrenchRequest,
+    PublishedReply,
     DiagnosisRequest,
     DiagnosisReply,
     RouteRequest,
@@ -91,6 +95,11 @@ def schema() -> dict[str, Any]:
         # keep the first sentence of a docstring
         if "description" in part:
             part["description"] = part["description"].partition("\n\n")[0]
+    published: dict[str, type[msgspec.Struct]] = {
+        service_key("<robot>", ServiceName.PLAY): ClimbSetPoints,
+        stream_key("<robot>", "<stream>", ServiceName.WRENCH): WrenchRequest,
+        stream_key("<robot>", "<stream>", ServiceName.SET_POINTS): PublishedReply,
+    }
     # request of each key, if it takes one, and the possible replies
     keys: dict[str, tuple[type[msgspec.Struct] | None, *tuple[type[msgspec.Struct], ...]]] = {
         ServiceName.PLAN: (PlanRequest, PlanReply, BriefPlanReply),
@@ -109,7 +118,7 @@ def schema() -> dict[str, Any]:
         "title": "Messages of crux, version 1",
         "anyOf": list(wholes[: len(MESSAGE_KINDS)]),
         "keys": {service_key("<robot>", name): _exchange(*each) for name, each in keys.items()}
-        | {service_key("<robot>", ServiceName.PLAY): {"published": _reference(ClimbSetPoints)}},
+        | {key: {"published": _reference(kind)} for key, kind in published.items()},
         "$defs": {names[name]: _renamed(part, names) for name, part in parts.items()},
     }
 

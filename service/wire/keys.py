@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Final
 
-__all__ = ["DEFAULT_ROBOT", "ServiceName", "service_key"]
+__all__ = ["DEFAULT_ROBOT", "ServiceName", "service_key", "stream_key"]
 
 
 class ServiceName(StrEnum):
@@ -16,6 +16,8 @@ class ServiceName(StrEnum):
     BODY_SPACE = "body_space"
     STREAM = "stream"
     SET_POINTS = "set_points"
+    WRENCH = "wrench"
+    """Body wrenches that clients publish on a stream; nobody answers queries there."""
     DIAGNOSIS = "diagnosis"
     HEALTH = "health"
     METRICS = "metrics"
@@ -46,3 +48,19 @@ def service_key(robot: str, name: str) -> str:
         A `ServiceName`.
     """
     return f"crux/{robot}/{name}"
+
+
+def stream_key(robot: str, stream: str, *parts: str) -> str:
+    """Return a zenoh key of a stream, ``crux/<robot>/stream/<stream>/...``.
+
+    Parameters
+    ----------
+    robot : str
+        Name of the robot that the service plans for.
+    stream : str
+        Identifier in the reply to the stream's declaration.
+    *parts : str
+        `ServiceName.WRENCH`, where wrenches are published, or `ServiceName.SET_POINTS`, where
+        their set-points are. Without parts, the key of the stream's liveliness token.
+    """
+    return service_key(robot, "/".join((ServiceName.STREAM, stream, *parts)))
