@@ -104,7 +104,11 @@ def test_the_demonstration_climbs_and_its_route_is_planned_again(tmp_path, capsy
     again = tmp_path / "again"
     assert run_command_line(["route", str(folder / "route.json"), "-o", str(again), "--json"]) == 0
     capsys.readouterr()
-    assert len(read_trajectory(again)) == len(knots)
+    # digits of the file may lead another way through the air, but to the same end
+    repeated = read_trajectory(again)
+    assert all(knot.verified for knot in repeated)
+    assert [knot.move for knot in repeated if knot.phase == "load"][-1:] == [len(moves)]
+    np.testing.assert_allclose(repeated[-1].body.position, knots[-1].body.position, atol=1e-9)
 
 
 def lines(file: Path) -> list[dict]:
