@@ -103,7 +103,6 @@ def test_what_a_detail_does_not_tell_is_not_named() -> None:
 @pytest.mark.parametrize(
     "want",
     [
-        pytest.param(["robust"], marks=pytest.mark.slow),
         ["model"],
         ["clearance", "prices"],
         ["model", "prices"],

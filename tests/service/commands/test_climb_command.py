@@ -72,6 +72,7 @@ def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path, capsys):
 def test_it_is_proven_that_a_wall_with_a_gap_cannot_be_climbed(tmp_path, capsys):
     folder = tmp_path / "out"
     given = ["climb", "blocked-wall", "--from", "height:1.0", "--to", "height:2.2"]
+    given += ["--spacing", "0.2", "--body-spacing", "0.25"]
     status = run_command_line([*given, "-o", str(folder), "--json"])
     reply = json.loads(capsys.readouterr().out)
     assert (status, reply["status"], reply["least"]) == (3, "none", None)
