@@ -53,21 +53,17 @@ def write_climb_page(
         extent = float(np.ptp(drawn.vertices, axis=0).max())
         drawn = coarse(drawn, extent / PICTURE_SETTINGS.wall_cells)
     surface = DrawnSurface("rock", "", rock_pose.apply(drawn.vertices), drawn.faces)
-    whole = meshes.of(surface, into)
+    meshes.rock = meshes.of(surface, into)
     if found.result is None:
         eyes = {"oblique": 0.6 * across - 0.8 * into, "facing the rock": -into}
         views = {name: {"eye": eye.tolist(), "up": up.tolist()} for name, eye in eyes.items()}
         empty: dict[str, Any] = {"lines": [], "dots": [], "arrows": [], "labels": [], "tiles": []}
-        scene = empty | {"surfaces": [], "views": views}
+        scene = empty | {"surfaces": [meshes.rock], "views": views}
         stages: list[dict[str, Any]] = [
             {"name": "", "status": found.status, "sentence": "", "scene": scene}
         ]
     else:
         stages = shown_stages(found.result, meshes)
-    for stage in stages:
-        if "scene" in stage:
-            parts = stage["scene"]["surfaces"]
-            stage["scene"]["surfaces"] = [p for p in parts if p["kind"] != "rock"] + [whole]
     lifts = wall.screening.hands.supports(np.eye(6)[2:3])[:, 0] * WRENCH_UNIT[2]
     bounded = math.isfinite(found.bound)
     shown = {

@@ -23,10 +23,13 @@ class Meshes:
     packed : list of str
         Little-endian numbers in base64: corners in W [m] as 32-bit floats, or indices of the
         triangles' corners as 32-bit integers.
+    rock : dict of str to object, or None
+        Surface of `of` that all scenes show in place of the rock of their own holds, if any.
     """
 
     def __init__(self) -> None:
         self.packed: list[str] = []
+        self.rock: dict[str, Any] | None = None
         self._known: dict[str, int] = {}
 
     def index_of(self, numbers: Array | Indices) -> int:
@@ -84,12 +87,13 @@ def scene_data(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]
         "from the side": aside,
     }
     hands = {hand.limb: hand for hand in question.stance.hands}
+    surfaces = [
+        meshes.of(each, hands[each.name].pose.rotation[:, 2] if each.name else seen.into)
+        for each in scene.surfaces
+        if len(each.faces) and (meshes.rock is None or each.kind != "rock")
+    ]
     return {
-        "surfaces": [
-            meshes.of(each, hands[each.name].pose.rotation[:, 2] if each.name else seen.into)
-            for each in scene.surfaces
-            if len(each.faces)
-        ],
+        "surfaces": surfaces if meshes.rock is None else [*surfaces, meshes.rock],
         "lines": [{"kind": line.kind, "points": _places(line.points)} for line in scene.lines],
         "dots": [
             {"kind": dots.kind, "points": _places(dots.points), "used": _used(dots.utilisations)}
