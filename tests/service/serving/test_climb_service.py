@@ -24,7 +24,7 @@ from service.requests import ClimbRequest, PlanRequest
 from service.serving import PlanService, open_session, zenoh_config
 from service.wire import ServiceError, service_key
 from tests.suite.helpers.checkout import ROOT
-from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.patience import PATIENCE, soon
 from tests.suite.helpers.requests import wall_request
 from tests.suite.helpers.searched import asked, progress, searching
 from tests.suite.helpers.served import client_config, free_endpoint
@@ -72,11 +72,14 @@ class Site:
         return sum(float(line.removeprefix(name)) for line in lines if line.startswith(name))
 
     def wait_until(self, so: Callable[[HealthReply], bool]) -> HealthReply:
-        until = time.monotonic() + PATIENCE
-        while not so(health := self.health()):
-            assert time.monotonic() < until, health
-            time.sleep(0.02)
-        return health
+        seen = list[HealthReply]()
+
+        def there() -> bool:
+            seen.append(self.health())
+            return so(seen[-1])
+
+        assert soon(there), seen[-1]
+        return seen[-1]
 
     def climbing(self) -> int:
         """Wait for the one climb in work; return the process that works on it."""
