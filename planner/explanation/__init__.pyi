@@ -19,6 +19,7 @@ from .sentences import (
     constraint_words as constraint_words,
     limit_sentence as limit_sentence,
     overload_sentence as overload_sentence,
+    part_words as part_words,
     shortfall_sentence as shortfall_sentence,
 )
 from .stance_warnings import (

@@ -22,6 +22,7 @@ __all__ = [
     "constraint_words",
     "limit_sentence",
     "overload_sentence",
+    "part_words",
     "shortfall_sentence",
 ]
 
@@ -165,6 +166,12 @@ def limit_sentence(used: LimitUse, hand: HandPlan | None, *, held: bool) -> str:
 def constraint_words(name: LimitName) -> str:
     """Return words for a constraint's part and what the part cannot do: ``palm cannot pull``."""
     return f"{_bearer(name)} {_barrier(name.limit)}"
+
+
+def part_words(name: LimitName) -> str:
+    """Return words for the part of a limb that a limit is of: ``distal of inner left``."""
+    parts = (name.phalanx, name.finger, name.joint)
+    return " of ".join(part.replace("_", " ") for part in parts if part is not None)
 
 
 def shortfall_sentence(

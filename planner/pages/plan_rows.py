@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from planner.explanation import constraint_words
+from planner.explanation import constraint_words, part_words
 from planner.pictures import joint_utilisations
 from planner.question import Question
 from planner.result import LimitName, Plan
@@ -96,8 +96,7 @@ def _joints(plan: Plan, question: Question) -> Iterator[list[Any]]:
 
 def _owned(name: LimitName) -> list[str]:
     """Return the limb, the part and the name of a limit."""
-    parts = [part for part in (name.phalanx, name.finger, name.joint) if part is not None]
-    return [_said(name.limb), _said(" of ".join(parts)), _said(name.limit)]
+    return [_said(name.limb), part_words(name), _said(name.limit)]
 
 
 def _said(name: str) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from hand_models.base import Array
 from hand_models.hand import NAIL
-from planner.explanation import constraint_words
+from planner.explanation import constraint_words, part_words
 from planner.pictures.plan_views import UTILISATION_COLOURS, UTILISATION_NORM
 from planner.question import Question
 from planner.result import SPREAD_SETTINGS, Certificate, LimitName, Plan, Spread
@@ -183,9 +183,8 @@ def _lines(names: Sequence[LimitName]) -> list[str]:
     """Return what constraints forbid, by hand, a hand's alike in one line; the first lines."""
     alike: dict[str, dict[str, list[str]]] = {}
     for name in names:
-        parts = (name.phalanx, name.finger, name.joint)
-        whose = " of ".join(part.replace("_", " ") for part in parts if part is not None)
-        alike.setdefault(name.limb, {}).setdefault(constraint_words(name), []).append(whose)
+        of_limb = alike.setdefault(name.limb, {})
+        of_limb.setdefault(constraint_words(name), []).append(part_words(name))
     lines = []
     for limb, found in alike.items():
         lines.append(f"{limb.replace('_', ' ')}:")
