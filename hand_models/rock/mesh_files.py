@@ -75,6 +75,8 @@ def read_vertices(path: Path) -> tuple[Array, Indices]:
             _check_counts(content, path)
         elif ending == ".obj":
             content = _absolute(content, path)
+        elif ending == ".stl":
+            _check_stl(content, path)
         try:
             # from memory, and so without a folder in which it would look for what the file names
             found = trimesh.load(
@@ -146,6 +148,23 @@ def _absolute(content: bytes, path: Path) -> bytes:
                 )
             lines[i] = b"f " + b" ".join(b"%d" % corner for corner in named)
     return b"\n".join(lines)
+
+
+def _check_stl(content: bytes, path: Path) -> None:
+    """Refuse an STL that is cut short: a text without its end, or fewer triangles than it names."""
+    head, one = 84, 50  # bytes before the triangles, and of each
+    named = int.from_bytes(content[80:head], "little")
+    if len(content) >= head + one * named and len(content) > head:
+        return  # binary, whatever its head says
+    if b"facet" in content[:1000]:
+        if b"endsolid" not in content[-1000:]:
+            raise InvalidInputError(f"the text has no endsolid, cut short: {path}; export it again")
+    elif len(content) < head or named:
+        there = max(len(content) - head, 0) // one
+        raise InvalidInputError(
+            f"the header names {named:,} triangles, and {there:,} are there, cut short, or it is "
+            f"no STL: {path}; export it again"
+        )
 
 
 def _check_counts(content: bytes, path: Path) -> None:

@@ -36,11 +36,14 @@ def read_columns(path: Path) -> RawScan:
     InvalidInputError
         If the file is not a text, columns are missing or ambiguous, or a line is not a point.
     """
-    whole = _text(path).splitlines()
+    whole = _text(path).rstrip("\x1a").splitlines()  # old programs end a file with that
     places = [i for i, line in enumerate(whole) if line.strip() and line.strip()[0] != "#"]
     lines = [whole[i] for i in places]
-    if lines and _is_count(lines[0], len(lines) - 1):
-        del lines[0]
+    # the count stands before the points, and before or after the names
+    for i, line in enumerate(lines[:2]):
+        if _is_count(line, len(lines) - i - 1, path):
+            del lines[i], places[i]
+            break
     if not lines:
         return RawScan(np.empty((0, 3)))
     sample = 1000  # lines that show how a table is written
@@ -49,6 +52,12 @@ def read_columns(path: Path) -> RawScan:
     names = None
     # a line of numbers whose decimals have the other mark is no names, and refused below
     if not any(_numbers(first, style._replace(decimal=mark), finite=0) for mark in ".,"):
+        if any(_numbers([cell] * len(AXIS_NAMES), style) for cell in first if cell):
+            first_line = f"line {places[-len(lines)] + 1}, {lines[0].strip()[:60]!r}, has"
+            raise InvalidInputError(
+                f"{first_line} numbers among other words, and is neither three numbers x, y and z "
+                f"nor names of columns: {path}"
+            )
         names = _names(first, style)
         del lines[0]
     width = len(_cells(lines[0], style)) if lines else len(names or ())
@@ -76,8 +85,16 @@ def _text(path: Path) -> str:
     return content.decode("utf-8-sig", "replace")
 
 
-def _is_count(line: str, rest: int) -> bool:
-    return line.strip().isdecimal() and int(line) == rest
+def _is_count(line: str, rest: int, path: Path) -> bool:
+    """Return whether a line is the number of those after it; refuse another number."""
+    if not (line.strip().isdecimal() and rest):
+        return False
+    if int(line) != rest:
+        raise InvalidInputError(
+            f"the line {line.strip()!r} is no point; as the number of points it is wrong, as "
+            f"{rest:,} lines follow: {path}; export it again, or remove what is no point",
+        )
+    return True
 
 
 def _style(lines: Sequence[str], path: Path) -> _Style:
@@ -95,15 +112,19 @@ def _style(lines: Sequence[str], path: Path) -> _Style:
     ranks = [(sum(others), first) for *others, first in fits]
     best = max(ranks)
     if not best[0]:
+        if all(re.fullmatch(r"[\s,;]*(nan[\s,;]*)+", line.lower()) for line in lines):
+            raise InvalidInputError(
+                f"all numbers are nan: {path}; export it again with the points of the rock"
+            )
         raise InvalidInputError(
             f"no line has three numbers separated by commas, semicolons or spaces: {path}; write "
-            "x, y and z of a point on each line"
+            f"x, y and z of a point on each line, without other marks, not {some[0].strip()[:60]!r}"
         )
     return styles[ranks.index(best)]
 
 
 def _cells(line: str, style: _Style) -> list[str]:
-    if style.mark == "," and line.rstrip().endswith(","):
+    if style.mark == "," and line.rstrip().endswith(",") and line.count(",") >= len(AXIS_NAMES):
         line = line.rstrip()[:-1]
     return [cell.strip().strip("\"'") for cell in line.strip("\r\n").split(style.mark)]
 

@@ -5,6 +5,7 @@ Columns go along x, rows against y: the first row has the largest y, as in pictu
 
 from __future__ import annotations
 
+import codecs
 import io
 import math
 import zipfile
@@ -68,6 +69,10 @@ def read_numpy(path: Path, cell: float | None) -> RawScan:
         raise InvalidInputError(
             f"an array of three columns holds points, not a grid of heights: {path}; save the "
             "points as .xyz"
+        )
+    if heights.dtype.kind not in "fiu":
+        raise InvalidInputError(
+            f"heights must be integers or floats, got {heights.dtype} in {path}; save them as such"
         )
     return _grid(heights, _sides(cell, _numpy_cell(arrays)))
 
@@ -173,7 +178,8 @@ def _geo_cell(tags: Mapping[GeoTag, Any]) -> Cell | None:
 def is_esri(path: Path) -> bool:
     """Return True if a text file is an ESRI ASCII grid, False if it may be columns of points."""
     with path.open("rb") as file:
-        return file.read(5).lower() == b"ncols"
+        begin = file.read(64).removeprefix(codecs.BOM_UTF8).lstrip().lower()
+    return begin.startswith((b"ncols", b"nrows"))
 
 
 def read_esri(path: Path, cell: float | None) -> RawScan:
@@ -192,7 +198,8 @@ def read_esri(path: Path, cell: float | None) -> RawScan:
     """
     header: dict[str, float] = {}
     # some programs write a comma before decimals, none between heights
-    lines = iter(path.read_text(encoding="utf-8").replace(",", ".").splitlines())
+    text = path.read_text(encoding="utf-8-sig").replace(",", ".")
+    lines = (line for line in text.splitlines() if line.strip())
     first = ""
     for first in lines:
         words = first.split()

@@ -93,6 +93,33 @@ class Gaps:
         """
         return float(self.area[~self.open_(hole)].sum() / self.area.sum())
 
+    def gap(self, hole: float) -> float:
+        """Return the median width, by area, of what is open between the points [m]; 0 if nothing.
+
+        Open are the triangles that bridge more than ``hole`` [m].
+        """
+        wide = np.flatnonzero(self.open_(hole) & np.isfinite(self.bridged))
+        wide = wide[np.argsort(self.bridged[wide])]
+        covered = np.cumsum(self.area[wide])
+        if not len(wide):
+            return 0.0
+        return float(self.bridged[wide[np.searchsorted(covered, 0.5 * covered[-1])]])
+
+    def alone(self, hole: float) -> int:
+        """Return the number of points that no closed triangle joins, with a step around them.
+
+        Stray points are such: across the view others are near, and along it more than ``hole`` [m]
+        away.
+        """
+        open_ = self.open_(hole)
+        lone = np.ones(len(self.points), dtype=bool)
+        lone[self.corners[~open_]] = False
+        about = self.corners[lone[self.corners].any(axis=1)]
+        triangles = self.points[about]
+        step = (empty_circles(triangles) <= hole) & (np.ptp(triangles[..., 2], axis=1) > hole)
+        beside = about[step]
+        return int(np.count_nonzero(lone[np.unique(beside)]))
+
     def left(self, hole: float) -> tuple[tuple[Hole, ...], tuple[Step, ...]]:
         """Return the open holes and steps that are not connected to the outline.
 

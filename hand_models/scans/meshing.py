@@ -99,6 +99,7 @@ def mesh_scan(
         dropped=scan.dropped,
         covered=made.gaps.covered(hole),
         outliers=scan.outliers,
+        alone=made.gaps.alone(hole),
         spacing=_spacing(points),
         filled=tuple(in_scan(cells, middle, axes) for cells in filled),
         gaps=made.gaps,
@@ -264,11 +265,22 @@ def _check_strays(points: Array) -> None:
     """Refuse points that are so far from the others that no triangulation resolves both."""
     farthest = scan_table().scalar("scan", "farthest")
     distances = np.abs(points - np.median(points, axis=0)).max(axis=1)
-    strays = int(np.count_nonzero(distances > farthest))
+    far = points[distances > farthest]
+    strays = len(far)
+    places, counts = np.unique(far[:1000], axis=0, return_counts=True)
+    if strays and counts.max() > 1:
+        place = ", ".join(f"{x:g}" for x in places[counts.argmax()])
+        raise InvalidInputError(
+            f"{strays} of {len(points)} points are more than {farthest:g} m from the median point, "
+            f"several at exactly ({place}) m, as if they stood for points that were not measured: "
+            "leave them out of the export, or write nan",
+            field="file",
+        )
     if strays:
         raise InvalidInputError(
             f"{strays} of {len(points)} points are more than {farthest:g} m from the median point, "
-            f"the farthest {distances.max():.3g} m: remove them, or cut the scan to the rock",
+            f"the farthest {distances.max():.3g} m: drop them (--std-ratio), or cut the scan to "
+            "the rock",
             field="file",
         )
 
@@ -283,6 +295,12 @@ def _check_spread(points: Array, spacing: float | None = None) -> None:
                 f"must leave points that are not on a line across the view, got {spacing:g} m; "
                 "give a smaller one",
                 field="spacing",
+            )
+        sizes = np.linalg.svd(np.cov(points.T), compute_uv=False)
+        if sizes[1] <= 1e-9 * sizes[0]:
+            raise InvalidInputError(
+                "the points lie on one line, not on a surface: export the whole scan",
+                field="file",
             )
         raise InvalidInputError(
             "the points lie on one line across the view, not on a surface: give another view",

@@ -40,15 +40,16 @@ def read_pcd(path: Path) -> RawScan:
             f"reading PCD needs the package pypcd4: {to_install('scans')}"
         ) from None
     cloud = PointCloud.from_path(path)
-    absent = [axis for axis in AXIS_NAMES if axis not in cloud.fields]
+    own = {field.lower(): field for field in reversed(cloud.fields)}
+    absent = [axis for axis in AXIS_NAMES if axis not in own]
     if absent:
         raise InvalidInputError(
             f"fields x, y and z are needed, {absent[0]} is missing: {path}; "
             "export it again with them"
         )
-    points = np.column_stack([np.atleast_1d(cloud.pc_data[axis]) for axis in AXIS_NAMES]).astype(
-        float
-    )
+    points = np.column_stack(
+        [np.atleast_1d(cloud.pc_data[own[axis]]) for axis in AXIS_NAMES]
+    ).astype(float)
     if len(points) != cloud.metadata.points:
         raise InvalidInputError(
             f"{len(points)} of {cloud.metadata.points} points are there, cut short: {path}; export "

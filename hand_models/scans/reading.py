@@ -41,8 +41,30 @@ ADVICE_BY_ENDING: Final = {
         (".vrt", ".img", ".dem", ".hgt", ".adf", ".nc"),
         "make it GeoTIFF by `gdal_translate -of GTiff`",
     ),
+    **dict.fromkeys(
+        (".gz", ".zip", ".bz2", ".xz", ".zst", ".7z", ".rar", ".tgz"),
+        "it is packed: unpack it first",
+    ),
 }
 """Advice on how to convert files of other kinds, by their ending."""
+
+ENDING_BY_BEGINNING: Final = {
+    b"ply\n": ".ply",
+    b"ply\r": ".ply",
+    b"# .PCD": ".pcd",
+    b"LASF": ".las",
+    b"ASTM-E57": ".e57",
+    b"\x93NUMPY": ".npy",
+    b"II*\0": ".tif",
+    b"MM\0*": ".tif",
+    b"PK\x03\x04": ".zip",
+    b"\x1f\x8b": ".gz",
+    b"BZh": ".bz2",
+    b"\xfd7zXZ": ".xz",
+    b"7z\xbc\xaf": ".7z",
+    b"glTF": ".glb",
+}
+"""First bytes of files, by which a file with the ending of another kind is told."""
 
 
 def read_scan(
@@ -56,7 +78,7 @@ def read_scan(
     cell: float | None = None,
     width: float | None = None,
 ) -> Scan:
-    """Read a scan from a file; points that are not finite are left out.
+    """Read a scan from a file; points that are not finite are left out, and several at zero.
 
     Parameters
     ----------
@@ -99,7 +121,7 @@ def read_scan(
     else:
         raw = raw._replace(scanner=None)
     read = len(raw.points)
-    raw = _finite(raw)
+    raw = _finite(_measured(raw))
     _check_numbers(raw.points, read, path)
     scale, turn = _scale(raw.points, unit, width), UP_ROTATIONS[up]
     _check_digits(raw.points, scale, path)
@@ -142,6 +164,17 @@ def _in_world(raw: RawScan, scanner: Pose) -> RawScan:
     if 0.5 * (float(np.trace(scanner.rotation)) - 1.0) > math.cos(1e-3):
         return raw
     return raw._replace(points=raw.points @ scanner.rotation.T + scanner.position)
+
+
+def _measured(raw: RawScan) -> RawScan:
+    """Return a cloud whose points at exactly (0, 0, 0), if there are several, are not finite.
+
+    So scanners write directions in which nothing was measured.
+    """
+    nowhere = np.asarray((raw.points == 0.0).all(axis=1))
+    if raw.heights or raw.faces is not None or np.count_nonzero(nowhere) < 2 or nowhere.all():
+        return raw
+    return raw._replace(points=np.where(nowhere[:, None], np.nan, raw.points))
 
 
 def _finite(raw: RawScan) -> RawScan:
@@ -235,6 +268,7 @@ def _raw(path: Path, cell: float | None) -> RawScan:
             field="file",
         )
     with reading_file(path):
+        _check_kind(path, ending)
         match ending:
             case ".npy" | ".npz":
                 return read_numpy(path, cell)
@@ -253,6 +287,18 @@ def _raw(path: Path, cell: float | None) -> RawScan:
                 f"is for grids of heights, {path} has points: leave cell out", field="cell"
             )
         return read(path)
+
+
+def _check_kind(path: Path, ending: str) -> None:
+    """Refuse a file that is empty, or begins as one of another kind than its ending says."""
+    with path.open("rb") as file:
+        begin = file.read(max(map(len, ENDING_BY_BEGINNING)))
+    if not begin:
+        raise InvalidInputError(f"{path} is empty: export it again with the points of the rock")
+    own = next((own for key, own in ENDING_BY_BEGINNING.items() if begin.startswith(key)), ending)
+    if own not in (ending, {".tiff": ".tif", ".npz": ".zip"}.get(ending)):
+        does = ADVICE_BY_ENDING.get(own, f"name it so that it ends in {own}")
+        raise InvalidInputError(f"{path} is named {ending}, and begins as {own} does; {does}")
 
 
 def _read_vertices(path: Path) -> RawScan:

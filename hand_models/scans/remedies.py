@@ -36,12 +36,15 @@ class Remedy(NamedTuple):
         Number of holes and steps that are left.
     std_ratio : float, optional
         Standard deviations beyond which points are dropped in addition to a wider hole.
+    covered : float
+        Share of the area within the outline that is then covered.
     """
 
     option: str
     value: float
     left: int
     std_ratio: float | None = None
+    covered: float = 1.0
 
 
 def remedy(
@@ -50,11 +53,11 @@ def remedy(
     """Return an option that meshes a scan with few holes and steps; None if no option does.
 
     Tried in turn are dropping points that stand alone (`drop_outliers`), unless some were dropped
-    or there are neither steps nor pieces, bridging holes up to the palm's width, and both. An
-    option is taken at once if it leaves at most the share ``left_holes`` of the present holes and
-    steps (or of ``many_holes`` if that is more), never more than ``many_holes``; else the best
-    option that leaves at most half of them is taken. It has to cover ``least_covered`` of the
-    outline, and 95 % of the area covered before.
+    or there are neither strays, steps nor pieces, bridging holes up to the palm's width, and both;
+    then dropping more points. An option is taken at once if it leaves at most the share
+    ``left_holes`` of the present holes and steps (or of ``many_holes`` if that is more), and never
+    more than ``many_holes``; else the option that leaves the fewest. It has to leave at most half
+    of them, and to cover ``least_covered`` of the outline, and 95 % of the area covered before.
 
     Parameters
     ----------
@@ -76,13 +79,13 @@ def remedy(
     for option, value, std_ratio, gaps in _trials(scan, rock, hole, spacing):
         wide = value if option == "hole" else hole
         left = sum(map(len, gaps.left(wide)))
-        if gaps.covered(wide) < covered:
+        closed = gaps.covered(wide)
+        if closed < covered or left > min(0.5 * open_, many):
             continue
-        found = Remedy(option, value, left, std_ratio)
+        found = Remedy(option, value, left, std_ratio, closed)
         if left <= enough:
             return found
-        if left <= min(0.5 * open_, many):
-            helping.append(found)
+        helping.append(found)
     return min(helping, key=lambda each: each.left, default=None)
 
 
@@ -92,17 +95,25 @@ def _trials(
     """Yield an option, its value, the ratio of dropped points beside it, and what is then open."""
     assert rock.gaps is not None
     table = scan_table()
-    dropped, std_ratio = None, 2.0  # as in Open3D's example
     # a point that stands alone has steps about it
-    alone = rock.steps or rock.covered < table.scalar("mesh", "least_covered")
-    if alone and not scan.outliers and len(scan.points) > table.scalar("outliers", "neighbours"):
+    alone = rock.alone or rock.steps or rock.covered < table.scalar("mesh", "least_covered")
+    dropping = alone and not scan.outliers
+    if not dropping or len(scan.points) <= table.scalar("outliers", "neighbours"):
+        for wider in wider_holes(hole):
+            yield "hole", wider, None, rock.gaps
+        return
+    # more of them than half of what is open: a wider hole would make rock of them
+    strays = 2 * rock.alone >= len(rock.holes) + len(rock.steps) > 0
+    # as in Open3D's example; where strays are so many that they widen the deviation, less
+    for std_ratio in (2.0, 1.0):
         dropped = triangulated(drop_outliers(scan, std_ratio), spacing).gaps
         yield "std_ratio", std_ratio, None, dropped
-    for wider in wider_holes(hole):
-        yield "hole", wider, None, rock.gaps
-    if dropped is not None:
-        for wider in wider_holes(hole):
-            yield "hole", wider, std_ratio, dropped
+        bridges: list[tuple[float | None, Gaps]] = [(std_ratio, dropped)]
+        if std_ratio == 2.0:
+            bridges.insert(1 if strays else 0, (None, rock.gaps))
+        for ratio, gaps in bridges:
+            for wider in wider_holes(hole):
+                yield "hole", wider, ratio, gaps
 
 
 def drop_outliers(scan: Scan, std_ratio: float, *, neighbours: int | None = None) -> Scan:

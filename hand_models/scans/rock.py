@@ -44,7 +44,9 @@ class ScannedRock:
         Share of the area within the points' convex outline, seen along the view, that has
         triangles; 1 for a file's triangles.
     outliers : int
-        Number of points that were left out because they stand alone.
+        Number of points that were left out because they stand alone (`drop_outliers`).
+    alone : int
+        Number of points without triangles that have steps around them, as stray points have.
     kept, turned : bool
         True if the triangles are the file's; True if these were turned over because they faced
         away from the given view.
@@ -64,6 +66,7 @@ class ScannedRock:
     steps: tuple[Step, ...] = ()
     covered: float = 1.0
     outliers: int = 0
+    alone: int = 0
     kept: bool = False
     turned: bool = False
     gaps: Gaps | None = None

@@ -162,11 +162,12 @@ class Scan:
         if self.faces is not None:
             shown = self.shown()
             return np.array([0.0, 0.0, -1.0]) if shown is None else -shown
-        middle = self.points.mean(axis=0)
+        bulk = self._bulk()
+        middle = bulk.mean(axis=0)
         if self.assumed:
-            self._check_origin(middle)
-        normal = np.asarray(np.linalg.eigh(np.cov((self.points - middle).T))[1][:, 0])
-        depth = (self.points - self.viewpoint) @ normal
+            self._check_origin(bulk)
+        normal = np.asarray(np.linalg.eigh(np.cov((bulk - middle).T))[1][:, 0])
+        depth = (bulk - self.viewpoint) @ normal
         if depth.min() > 0.0:
             return normal
         if depth.max() < 0.0:
@@ -198,10 +199,17 @@ class Scan:
             return None
         return np.asarray(total / length)
 
-    def _check_origin(self, middle: Array) -> None:
+    def _bulk(self) -> Array:
+        """Return the points without the few that are far off: one would turn the view."""
+        low, high = np.percentile(self.points, (1.0, 99.0), axis=0)
+        # twice as far from the middle as 98 in a hundred points are
+        near = np.abs(self.points - 0.5 * (low + high)).max(axis=1) <= float((high - low).max())
+        return self.points if near.all() else self.points[near]
+
+    def _check_origin(self, bulk: Array) -> None:
         """Refuse the file's origin as the scanner's place if no scanner can have been there."""
-        size = float(np.ptp(self.points, axis=0).max())
-        away = float(np.linalg.norm(middle - self.viewpoint))
+        size = float(np.ptp(bulk, axis=0).max())
+        away = float(np.linalg.norm(bulk.mean(axis=0) - self.viewpoint))
         if away > scan_table().scalar("scan", "farthest_scanner") * size:
             raise InvalidInputError(
                 "the scanner's position is unknown: the file has none, and the file's origin is "

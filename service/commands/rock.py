@@ -186,6 +186,7 @@ def _summary(made: scans.ScannedRock) -> dict[str, Any]:
         "read": made.read,
         "dropped": made.dropped,
         "outliers": made.outliers,
+        "alone": made.alone,
         "kept": made.kept,
         "vertices": len(made.vertices),
         "triangles": len(made.faces),
@@ -219,13 +220,7 @@ def _warnings(
         found.append(
             "the triangles showed their backs to that view, and were turned over: is it meant?"
         )
-    open_ = len(made.holes) + len(made.steps)
-    pieces = made.covered < SCAN_NUMBERS.scalar("mesh", "least_covered")
-    if pieces or open_ > SCAN_NUMBERS.scalar("mesh", "many_holes"):
-        found.append(
-            f"{open_} holes and steps, and gaps over {100.0 * (1.0 - made.covered):.0f} % of the "
-            f"outline, leave hands little to hold{_advice(scan, made, hole, spacing)}"
-        )
+    found += _open_warnings(scan, made, hole, spacing)
     found += [
         f"{each.cells:,} points are at exactly {each.value:g} m, with cliffs around them; leave "
         "out cells that have no height"
@@ -236,6 +231,39 @@ def _warnings(
     if small := scans.too_small(float(made.extent.max()), reading["unit"]):
         found.append(small)
     return [*found, *_far_away(made.pose)]
+
+
+def _open_warnings(
+    scan: scans.Scan, made: scans.ScannedRock, hole: float, spacing: float | None
+) -> Iterator[str]:
+    """Yield a warning of what is open between the points, with its cause and what was tried."""
+    open_ = len(made.holes) + len(made.steps)
+    pieces = made.covered < SCAN_NUMBERS.scalar("mesh", "least_covered")
+    many = pieces or open_ > SCAN_NUMBERS.scalar("mesh", "many_holes")
+    # so many are no exception
+    strays = made.gaps is not None and 0 < 10 * made.alone <= len(made.gaps.points)
+    if not (many or (strays and open_)):
+        return
+    if scan.heights and pieces and not strays and made.alone:
+        yield (
+            f"{made.alone:,} of {made.read:,} cells differ by more than {1e3 * hole:g} mm from "
+            "all others beside them: is the cell in degrees, or in another unit than the heights?"
+        )
+        return
+    some = [tables.counted(open_, "hole or step", "holes and steps")] if open_ else []
+    if many and made.covered < 0.99:
+        gaps = f"gaps over {100.0 * (1.0 - made.covered):.0f} % of the outline"
+        wide = 0.0 if made.gaps is None else made.gaps.gap(hole)
+        # so much farther apart in one direction than in the other
+        if pieces and 3.0 * made.spacing < wide < 0.25 * made.extent.max():
+            apart = f"{1e3 * made.spacing:.2g} mm apart"
+            gaps += f" (points are {apart}, in lines or patches {1e3 * wide:.0f} mm apart)"
+        some.append(gaps)
+    found = " and ".join(some) + (" leave hands little to hold" if many else " left open")
+    if strays:
+        points = tables.counted(made.alone, "point")
+        found = f"{points} before or behind the rock, joined to nothing, may be stray; {found}"
+    yield found + _advice(scan, made, hole, spacing)
 
 
 def _far_away(pose: Pose) -> Iterator[str]:
@@ -269,7 +297,10 @@ def _advice(scan: scans.Scan, made: scans.ScannedRock, hole: float, spacing: flo
     how = {"std_ratio": "without stray points, --std-ratio", "hole": "with --hole"}[found.option]
     if found.std_ratio is not None:
         how = f"without stray points, --std-ratio {found.std_ratio:g}, and {how}"
-    return f": {how} {found.value:g}, {found.left} holes and steps are left"
+    left = "1 hole or step" if found.left == 1 else f"{found.left} holes and steps"
+    if found.covered < 0.99:
+        left += f", and gaps over {100.0 * (1.0 - found.covered):.0f} % of the outline,"
+    return f": {how} {found.value:g}, {left} {'is' if found.left == 1 else 'are'} left"
 
 
 def _why_large(made: scans.ScannedRock) -> str:
@@ -305,8 +336,9 @@ def _print_rock(
         whence += ", assumed: " + ("from the file's origin" if scan.faces is None else "from above")
     rows = [
         ("points read", f"{made.read:,}", ""),
-        ("dropped", f"{made.dropped:,}", "not finite"),
+        ("dropped", f"{made.dropped:,}", "not finite, or several at (0, 0, 0)"),
         ("outliers", f"{made.outliers:,}", "dropped, far from their neighbours"),
+        ("alone", f"{made.alone:,}", "left out, joined to nothing, maybe stray"),
         ("kept", f"{len(made.vertices):,}", f"{1e3 * made.spacing:.3g} mm apart"),
         ("triangles", f"{len(made.faces):,}", "the file's own" if made.kept else ""),
         ("extent", " × ".join(f"{size:.3f}" for size in made.extent), "m along x, y, z"),
@@ -315,8 +347,8 @@ def _print_rock(
         ("holes", *_sizes("wider", [each.width for each in made.holes], hole)),
         ("steps", *_sizes("higher", [each.height for each in made.steps], hole)),
     ]
-    if not made.outliers:
-        rows = [row for row in rows if row[0] != "outliers"]
+    absent = {"outliers": not made.outliers, "alone": not made.alone}
+    rows = [row for row in rows if not absent.get(row[0])]
     if tables.verbosity() >= 0:
         tables.print_rows(rows, tables.in_order([""], [""], [""]), out, heads=False)
     out.print(f"pose {_pose(made.pose)}", soft_wrap=True)

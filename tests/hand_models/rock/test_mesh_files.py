@@ -126,8 +126,16 @@ def test_counts_of_an_off_are_not_believed(counts, tmp_path):
 def test_counts_of_an_stl_are_compared_with_its_size(tmp_path):
     path = tmp_path / "a.stl"
     path.write_bytes(bytes(80) + (2**32 - 1).to_bytes(4, "little") + bytes(100))
-    with pytest.raises(InvalidInputError, match=r"^file: "):
+    with pytest.raises(InvalidInputError, match=r"^file: .* 4,294,967,295 triangles, and 2 are"):
         read_mesh(path)
+    for kind, cut in (("stl", -60), ("stl_ascii", -60)):
+        content = ball().export(file_type=kind)
+        whole = content if isinstance(content, bytes) else content.encode()
+        path.write_bytes(whole)
+        assert len(read_mesh(path)[1]) == len(ball().faces)
+        path.write_bytes(whole[:cut])
+        with pytest.raises(InvalidInputError, match="cut short"):
+            read_mesh(path)
 
 
 CORNERS = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"

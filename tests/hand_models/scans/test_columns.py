@@ -40,6 +40,8 @@ def table(mark: str, decimal: str = ".", before: str = "", after: str = "", head
         table(";", after=";4", head="X_m;Y_m;Z_m;i\n"),
         table('","', before='"', after='"'),
         table(",", before="0.5,", head="n,x,y,z\n"),
+        table(" ", after=" 7", head="//X Y Z I\n3\n"),
+        table(" ") + "\n\x1a",
     ],
 )
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-8-sig"])
@@ -66,6 +68,10 @@ def test_every_usual_table_has_the_points_that_were_written(text, encoding, tmp_
             r"4 columns have names \(x, y, z, i\), and the next line has 3",
         ),
         ("1 2\n3 4\n5 6\n", "no line has three numbers"),
+        ("5\n1 2 3\n4 5 6\n7 8 1\n", "as the number of points it is wrong, as 3 lines follow"),
+        ("1 2 b\n4 5 6\n7 8 9\n1 1 1\n", "line 1, '1 2 b', has numbers among other words"),
+        ("nan nan nan\nnan nan nan\n", "all numbers are nan"),
+        ("1|2|3\n4|5|6\n", r"without other marks, not '4\|5\|6'"),
         ("POINT (1 2 3)\nPOINT (4 5 6)\n", "no line has three numbers"),
         ("1 2 3\n4 5 6\n7 8 1e38\n", "write nan"),
         ("1 2 3\n4 5 b\n7 8 9\n1 1 1\n", "line 2, '4 5 b', is not three .* 'b' is not a number: "),
@@ -98,6 +104,14 @@ def test_what_is_empty_is_not_finite(tmp_path):
 def test_a_first_line_of_missing_numbers_is_a_point_not_names(tmp_path):
     path = tmp_path / "cloud.xyz"
     path.write_text("nan nan nan\n1 2 3\n4 5 6\n7 8 1\n", encoding="utf-8")
+    scan = read_scan(path)
+    np.testing.assert_array_equal(scan.points, [[1, 2, 3], [4, 5, 6], [7, 8, 1]])
+    assert scan.dropped == 1
+
+
+def test_a_line_of_empty_cells_is_a_point_that_is_not_finite(tmp_path):
+    path = tmp_path / "cloud.csv"
+    path.write_text("x,y,z\n,,\n1,2,3\n4,5,6\n7,8,1\n", encoding="utf-8")
     scan = read_scan(path)
     np.testing.assert_array_equal(scan.points, [[1, 2, 3], [4, 5, 6], [7, 8, 1]])
     assert scan.dropped == 1

@@ -129,7 +129,51 @@ def test_what_is_advised_leaves_what_was_said(seed, apart, tmp_path):
 def test_stray_points_are_told_before_bridges(tmp_path):
     scan = scanned(strays(80), tmp_path)
     found = remedy(scan, mesh_scan(scan), 0.02)
-    assert found == ("std_ratio", 2.0, 0, None)
+    assert found == ("std_ratio", 2.0, 0, None, 1.0)
+
+
+@pytest.mark.parametrize("count", [1, 40, 360])
+def test_stray_points_in_place_of_rock_are_counted_and_dropped(count, tmp_path):
+    """Measured too near, as by a mixed pixel: each leaves a gap in the rock behind it."""
+    points, rng = wall(0.01, 0.3), np.random.default_rng(5)
+    some = rng.choice(len(points), count, replace=False)
+    points[some, 1] -= rng.uniform(0.05, 0.95, count)
+    scan = read_scan(write_cloud(tmp_path / "cloud.xyz", points))
+    rock = mesh_scan(scan)
+    # where every tenth point is stray some hide others
+    assert (0.5 if count > 100 else 1.0) * count <= rock.alone <= 1.1 * count
+    found = remedy(scan, rock, 0.02)
+    assert found is not None
+    hole = found.value if found.option == "hole" else 0.02
+    ratio = found.std_ratio or found.value
+    assert ratio in (1.0, 2.0)
+    again = mesh_scan(drop_outliers(scan, ratio), hole=hole)
+    assert len(again.holes) + len(again.steps) == found.left
+    assert found.left <= 0.1 * (len(rock.holes) + len(rock.steps))
+    assert abs(again.pose.rotation[1, 2]) > 0.99
+
+
+def test_a_block_that_stands_out_is_no_stray_point(tmp_path):
+    points = wall(0.01, 0.2)
+    points[np.abs(points[:, [0, 2]]).max(axis=1) < 0.06, 1] -= 0.1
+    rock = mesh_scan(scanned(points, tmp_path))
+    assert (rock.alone, len(rock.steps)) == (0, 1)
+
+
+@pytest.mark.parametrize("place", [(0.0, -30.0, 0.1), (15.0, 0.9, 0.0)])
+def test_one_point_far_off_does_not_turn_the_view(place, tmp_path):
+    points = np.vstack([wall(0.01, 0.2), place])
+    rock = mesh_scan(read_scan(write_cloud(tmp_path / "cloud.xyz", points)))
+    assert rock.pose.rotation[1, 2] > 0.99
+    assert len(rock.vertices) == len(points) - 1
+
+
+def test_the_gap_between_scan_lines_is_measured(tmp_path):
+    rock = mesh_scan(scanned(lines(0, 0.03), tmp_path))
+    assert rock.gaps is not None
+    assert rock.covered < 0.5
+    assert rock.gaps.gap(0.02) == pytest.approx(0.03, rel=0.1)
+    assert rock.gaps.gap(1e3) == 0.0
 
 
 def test_nothing_is_advised_where_nothing_helps(tmp_path):

@@ -200,7 +200,7 @@ def test_a_turned_noisy_cloud_far_from_its_origin_is_the_same_rock(tmp_path):
 @pytest.mark.parametrize(
     ("points", "words"),
     [
-        (np.empty((0, 3)), "at least three points are needed"),
+        (np.empty((0, 3)), "is empty"),
         (np.ones((1, 3)), "at least three points are needed"),
         (np.ones((9, 3)), r"all 9 points of .* are at \(1, 1, 1\)"),
         (np.linspace(0, 1, 9)[:, None] * [1, 2, 3], "on one line"),

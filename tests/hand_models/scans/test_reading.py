@@ -25,6 +25,27 @@ def heights(rows=7, columns=9):
     return found
 
 
+@pytest.mark.parametrize(
+    ("begin", "words"),
+    [
+        (b"", "is empty"),
+        (b"\x1f\x8b\x08\0", "begins as .gz does; it is packed: unpack it"),
+        (b"PK\x03\x04", "it is packed"),
+        (b"LASF\0\0", "begins as .las does; save it as PLY"),
+        (b"ASTM-E57\1", "begins as .e57 does; save it as PLY"),
+        (b"ply\nformat ascii 1.0\n", "begins as .ply does; name it so that it ends in .ply"),
+        (b"# .PCD v0.7\n", "ends in .pcd"),
+    ],
+)
+@pytest.mark.parametrize("ending", ["txt", "off"])
+def test_a_file_of_another_kind_than_its_ending_is_told(begin, words, ending, tmp_path):
+    path = tmp_path / f"scan.{ending}"
+    path.write_bytes(begin)
+    with pytest.raises(InvalidInputError, match=words) as error:
+        read_scan(path)
+    assert error.value.field == "file"
+
+
 # Clouds -------------------------------------------------------------------------------------------
 
 
@@ -97,6 +118,16 @@ def test_a_pcd_written_by_another_hand_tells_its_viewpoint(tmp_path):
     scan = read_scan(path, unit="cm")
     np.testing.assert_allclose(scan.points, 0.01 * CLOUD, atol=1e-8)
     np.testing.assert_allclose(scan.viewpoint, [0.005, -0.02, 0.0025])
+
+
+@pytest.mark.parametrize("name", ["a.pcd", "a.xyz"])
+def test_several_points_at_zero_were_not_measured(name, tmp_path):
+    """Organised clouds have them where a scanner got nothing back; one may be rock."""
+    points = np.vstack([CLOUD, np.zeros((5, 3))])
+    scan = read_scan(write_cloud(tmp_path / name, points))
+    assert (scan.dropped, len(scan.points)) == (5, len(CLOUD))
+    scan = read_scan(write_cloud(tmp_path / name, points[:-4]))
+    assert (scan.dropped, len(scan.points)) == (0, len(CLOUD) + 1)
 
 
 # Grids --------------------------------------------------------------------------------------------
@@ -308,3 +339,17 @@ def test_the_rows_of_a_text_are_compared_with_what_it_has(rows, tmp_path):
         read_scan(path)
     path.write_text("ncols 3\nnrows 3\ncellsize 0,5\n1,5 2 3\n4 5 6\n7 8 9\n")
     assert read_scan(path).points[0].tolist() == [0.0, 1.0, 1.5]
+
+
+@pytest.mark.parametrize("head", ["\ufeff", "  ", "\n"])
+def test_a_grid_in_text_is_told_whatever_stands_before_its_name(head, tmp_path):
+    path = write_esri(tmp_path / "grid.asc", heights(), CELL)
+    path.write_text(head + path.read_text(), encoding="utf-8")
+    assert read_scan(path).heights
+
+
+@pytest.mark.parametrize("kind", [complex, str, bool])
+def test_heights_that_are_no_real_numbers_are_refused(kind, tmp_path):
+    np.save(tmp_path / "grid.npy", np.zeros((4, 5)).astype(kind))
+    with pytest.raises(InvalidInputError, match="must be integers or floats"):
+        read_scan(tmp_path / "grid.npy", cell=0.01)
