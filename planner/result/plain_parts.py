@@ -216,9 +216,9 @@ class Finding(Struct, frozen=True):
     kind : str
         ``palm_away``, ``fingers_down``, ``body_in_rock``, ``body_reversed``, ``hands_overlap``,
         ``hand_in_body``, ``limbs_crossed``, ``out_of_reach``, ``gravity_up``, ``unit``,
-        ``hand_adds_nothing``, ``margin_not_had``, ``palm_without_travel``, ``tile_stretched_far``
-        or, if joints are known, ``link_in_rock``, ``links_collide``, ``mass_below_limbs`` and
-        ``com_off_posture``.
+        ``nearly_pinching``, ``hand_adds_nothing``, ``margin_not_had``, ``palm_without_travel``,
+        ``tile_stretched_far`` or, if joints are known, ``link_in_rock``, ``links_collide``,
+        ``mass_below_limbs`` and ``com_off_posture``.
     field : str
         Field of the question, such as ``stance.hands[0].pose.orientation``.
     message : str

@@ -31,7 +31,8 @@ def findings(scene: Scene) -> tuple[Finding, ...]:
     """Return a finding for each oddity in the geometry of a stance.
 
     Oddities are hands that are out of reach, reversed, overlapping or in the body, a reversed body,
-    a body in rock, crossed limbs, gravity that points up and fingers that point down.
+    a body in rock, crossed limbs, gravity that points up, fingers that point down and fingers that
+    nearly pinch.
 
     Raises
     ------
@@ -54,6 +55,7 @@ def findings(scene: Scene) -> tuple[Finding, ...]:
         *_in_body(scene),
         *_crossed(scene),
         *_gravity(scene),
+        *_nearly_pinching(scene),
     )
 
 
@@ -279,3 +281,16 @@ def _gravity(scene: Scene) -> Iterator[Finding]:
         )
         field = _of_hand(i, "pose.orientation")
         yield Finding("fingers_down", field, message, float(fingers[i]), "1")
+
+
+def _nearly_pinching(scene: Scene) -> Iterator[Finding]:
+    """Yield hands whose outer fingers lack less than a degree of half a turn."""
+    for i, hand in enumerate(scene.hands):
+        lacking = math.pi - hand.grasp.outer_rotation
+        if lacking < math.radians(1.0) and not hand.grasp.pinch:
+            message = (
+                f"{hand.limb}: its outer fingers turn by {hand.grasp.outer_rotation:.10g} rad, "
+                f"{lacking:.2g} rad less than in a pinch: is it pi (3.142)?"
+            )
+            field = _of_hand(i, "grasp.outer_rotation")
+            yield Finding("nearly_pinching", field, message, hand.grasp.outer_rotation, "rad")

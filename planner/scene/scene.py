@@ -24,6 +24,8 @@ class SceneSettings:
     """Part of what is usual up to which a number is taken for one in thousands, such as kN or t."""
     in_thousandths: float = 100.0
     """Multiple of it from which on it is taken for one in thousandths, such as g or N·mm."""
+    unit_factor: float = 0.01
+    """How near, as a part, a number must be to one in a unit that no power of ten tells from it."""
     widest: float = 20.0
     """Largest width of a hold, or lever of a moment, in multiples of the limbs' reach."""
     rock_length: float = 4.0

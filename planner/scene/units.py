@@ -94,8 +94,25 @@ def _force_unit(part: float) -> str | None:
     for unit, newtons, off in (
         ("kN", 1e3, 2.5),
         ("kgf", scene_number("usual", "standard_gravity"), 1.25),
+        # no decimal power tells it from a part of the weight
+        ("lbf", _pound_force(), 1.0 + SCENE_SETTINGS.unit_factor),
     ):
         if 1.0 / off <= part * newtons <= off:
+            return unit
+    return None
+
+
+def _pound_force() -> float:
+    return scene_number("usual", "standard_gravity") * scene_number("usual", "pound")
+
+
+def _mass_unit(part: float) -> str | None:
+    """Return the unit in which a mass, such a part of the robot's, would be the robot's."""
+    for unit, kilograms in (
+        ("N, as a weight", 1.0 / scene_number("usual", "standard_gravity")),
+        ("lb", scene_number("usual", "pound")),
+    ):
+        if abs(part * kilograms - 1.0) <= SCENE_SETTINGS.unit_factor:
             return unit
     return None
 
@@ -105,6 +122,10 @@ def _load(question: Question) -> Iterator[Finding]:
     farthest = 2.0 * robot.reach  # of a centre of mass [m]
     if load.mass is not None:
         part = load.mass / robot.mass
+        if unit := _mass_unit(part):
+            message = f"{load.mass:.4g} kg are {part:.3g} times the robot's {robot.mass:.4g} kg"
+            message += f": is it in kg, or in {unit}?"
+            yield _finding("load.mass", message, load.mass, "kg")
         if not SCENE_SETTINGS.in_thousands < part < SCENE_SETTINGS.in_thousandths:
             message = (
                 f"{load.mass:.4g} kg are {part:.2g} times what the robot weighs, {robot.mass:.4g} "

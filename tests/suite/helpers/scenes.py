@@ -331,6 +331,14 @@ SLIPS: dict[str, tuple[Callable[[Stance], Stance], set[str]]] = {
     "a tile's strength in kN": (lambda s: with_strength(s, shear_limit=0.057), {"unit"}),
     "a closing tension in gf": (lambda s: with_grasp(s, closing_tension=3770.0), {REFUSED}),
     "a closing tension in kgf": (lambda s: with_grasp(s, closing_tension=3.77), {"unit", REFUSED}),
+    "half a turn with two decimals": (
+        lambda s: with_grasp(s, outer_rotation=3.14),
+        {"nearly_pinching"},
+    ),
+    "half a turn cut after five": (
+        lambda s: with_grasp(s, outer_rotation=3.14159),
+        {"nearly_pinching"},
+    ),
     "a log in mm": (lambda s: with_hand(s, 0, hold=Cylinder(60.0)), {"unit"}),
     "a ball in cm": (lambda s: with_hand(s, 0, hold=Sphere(25.0)), {"unit"}),
 }
