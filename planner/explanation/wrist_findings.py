@@ -54,8 +54,10 @@ def palm_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterat
         words.append(f"{pressing:.0f} N of pressing across a gap of {1e3 * gap:.1f} mm")
     message = (
         f"{prepared.limbs[i]}: a fixed wrist does not move, but its palm carries "
-        f"{', and '.join(words)}{_alike(len(lacking) - 1, 'hand')}"
+        f"{', and '.join(words)}"
     )
+    if others := len(lacking) - 1:
+        message += f" ({others} other palm{'s' * (others > 1)} would have to move, too, not farther)"
     if not prepared.question.stance.hands[i].grasp.fingernail:
         message += "; 'wrist': 'compliant' plans with wrists that move"
     yield Finding("palm_without_travel", f"stance.hands[{i}].wrist", message, lacks, "m")
@@ -85,18 +87,14 @@ def stretch_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Ite
     # of tiles alike but for rounding, to a micrometre, the first
     stretch, i, tile = max(beyond, key=lambda each: (round(each[0], 6), -each[1], -each[2]))
     hand, most = hands[i], prepared.batch.hands[i].hand.largest_tile_stretch
-    alike = _alike(len(beyond) - 1, "tile")
+    others = len(beyond) - 1
+    too = f" ({others} other tile{'s' * (others > 1)} beyond it, too)" if others else ""
     driven = prepared.question.stance.hands[i].wrist == "compliant"
     less = "a shorter wrist_travel or less load" if driven else "less load"
     message = (
         f"{hand.limb}: {hand.tiles[tile].phalanx} tile of {hand.tiles[tile].finger} is stretched "
         f"by {1e3 * stretch:.1f} mm with {abs(hand.loads[tile, 0]):.0f} N of shear, beyond the "
-        f"hand's largest_tile_stretch of {1e3 * most:.3g} mm{alike}; its stiffness is not known so "
+        f"hand's largest_tile_stretch of {1e3 * most:.3g} mm{too}; its stiffness is not known so "
         f"far; {less} stretches it less"
     )
     yield Finding("tile_stretched_far", f"stance.hands[{i}].wrist", message, stretch, "m")
-
-
-def _alike(others: int, what: str) -> str:
-    """Return a remark that so many others are alike; nothing where there are none."""
-    return f" (and {others} other {what}{'s' * (others > 1)} alike)" if others else ""

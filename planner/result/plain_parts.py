@@ -216,17 +216,17 @@ class Finding(Struct, frozen=True):
     kind : str
         ``palm_away``, ``fingers_down``, ``body_in_rock``, ``body_reversed``, ``hands_overlap``,
         ``hand_in_body``, ``limbs_crossed``, ``out_of_reach``, ``gravity_up``, ``unit``,
-        ``nearly_pinching``, ``hand_adds_nothing``, ``margin_not_had``, ``palm_without_travel``,
-        ``tile_stretched_far`` or, if joints are known, ``link_in_rock``, ``links_collide``,
-        ``mass_below_limbs`` and ``com_off_posture``.
+        ``wrench_not_up``, ``nearly_pinching``, ``hand_adds_nothing``, ``margin_not_had``,
+        ``palm_without_travel``, ``tile_stretched_far`` or, if joints are known, ``link_in_rock``,
+        ``links_collide``, ``mass_below_limbs`` and ``com_off_posture``.
     field : str
         Field of the question, such as ``stance.hands[0].pose.orientation``.
     message : str
         What is odd, and the mistake that is its likely cause.
     value : float
-        Measured value: a depth, a distance, a share of the reach, a cosine, the travel that a palm
-        lacks, the stretch of a tile, or the utilisation without the hand; or the number that seems
-        to have a wrong unit.
+        Measured value: a depth, a distance, a share of the reach, a cosine, an angle, the travel
+        that a palm lacks, the stretch of a tile, or the utilisation without the hand; or the number
+        that seems to have a wrong unit.
     unit : str
         Unit of ``value``, such as ``m``, ``m/s²`` or ``1``.
     """
@@ -236,6 +236,11 @@ class Finding(Struct, frozen=True):
     message: str
     value: float
     unit: str
+
+    @property
+    def doubts_number(self) -> bool:
+        """True if a number is likely not what is meant: in another unit or frame."""
+        return self.kind in ("unit", "wrench_not_up")
 
 
 class Distance(Struct, frozen=True):

@@ -219,6 +219,8 @@ class SetPoints:
     save_first : str or None
         Limb of the hand on whose limits the overload after slips depends most; None where there is
         a plan within the cap, or nothing has slipped.
+    findings : tuple of Finding
+        What is odd about the body wrench: its unit, or its direction.
     """
 
     status: Status
@@ -238,3 +240,4 @@ class SetPoints:
     lost: tuple[LostTile, ...] = ()
     released: tuple[tuple[str, str], ...] = ()
     save_first: str | None = None
+    findings: tuple[Finding, ...] = ()

@@ -1,3 +1,4 @@
+from .body_wrench import WrenchCheck as WrenchCheck, wrench_findings as wrench_findings
 from .distances import (
     body_clearance as body_clearance,
     clearance as clearance,
@@ -12,4 +13,4 @@ from .scene import (
     scene_of as scene_of,
     smooth_depths as smooth_depths,
 )
-from .units import unit_findings as unit_findings, wrench_findings as wrench_findings
+from .units import unit_findings as unit_findings

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -26,6 +27,12 @@ class SceneSettings:
     """Multiple of it from which on it is taken for one in thousandths, such as g or N·mm."""
     unit_factor: float = 0.01
     """How near, as a part, a number must be to one in a unit that no power of ten tells from it."""
+    about_weight: float = 1.5
+    """Factor within which a force is about the robot's weight, so that it is likely to hold it."""
+    off_up: float = math.radians(60.0)
+    """Angle to up from which on a force about the weight is odd: pulls turn it less [rad]."""
+    least_payload: float = 1e-4
+    """Part of the robot's mass below which a payload changes nothing, so that it may be in t."""
     widest: float = 20.0
     """Largest width of a hold, or lever of a moment, in multiples of the limbs' reach."""
     rock_length: float = 4.0

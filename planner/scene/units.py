@@ -21,7 +21,7 @@ from planner.result import Finding
 from planner.robots import Robot, scene_number
 from planner.scene.scene import SCENE_SETTINGS
 
-__all__ = ["unit_findings", "wrench_findings"]
+__all__ = ["force_unit", "robot_findings", "unit_findings"]
 
 
 def unit_findings(question: Question) -> tuple[Finding, ...]:
@@ -30,10 +30,10 @@ def unit_findings(question: Question) -> tuple[Finding, ...]:
     Parameters
     ----------
     question : Question
-        Question to check, except for its body wrench: see `wrench_findings`.
+        Question to check, except for its body wrench: see `WrenchCheck`.
     """
     stance = question.stance
-    robot = tuple(_robot(stance.robot))
+    robot = tuple(robot_findings(stance.robot))
     found = (
         *_gravity(stance),
         *robot,
@@ -46,18 +46,6 @@ def unit_findings(question: Question) -> tuple[Finding, ...]:
     return found if robot else (*found, *_load(question), *_holds(stance), *_joints(question))
 
 
-def wrench_findings(question: Question) -> tuple[Finding, ...]:
-    """Return a finding if a given body wrench is likely in another unit.
-
-    Empty if the question has no body wrench, if the load has a mass or a centre of mass, or if the
-    robot's own numbers are odd.
-    """
-    stance, wrench = question.stance, question.body_wrench
-    if wrench is None or not question.load.own or any(_robot(stance.robot)):
-        return ()
-    return tuple(_wrench(stance, wrench))
-
-
 def _finding(field: str, message: str, value: float, unit: str, whose: str = "") -> Finding:
     """Return a finding whose message begins with whose number it is: a limb's, else the field's."""
     return Finding("unit", field, f"{whose or field}: {message}", value, unit)
@@ -66,28 +54,7 @@ def _finding(field: str, message: str, value: float, unit: str, whose: str = "")
 # What the body weighs -----------------------------------------------------------------------------
 
 
-def _wrench(stance: Stance, wrench: Array) -> Iterator[Finding]:
-    robot, field = stance.robot, "body_wrench"
-    gravity = float(np.linalg.norm(stance.gravity))
-    force, moment = (float(np.linalg.norm(part)) for part in wrench.reshape(2, 3))
-    weight, on_earth = robot.mass * gravity, robot.mass * scene_number("usual", "standard_gravity")
-    if force > SCENE_SETTINGS.in_thousandths * on_earth:
-        message = f"a force of {force:.3g} N is {force / on_earth:.3g} times the robot's weight"
-        yield _finding(field, f"{message} on the Earth: is it in N?", force, "N")
-    elif weight and force:
-        up = float(-stance.gravity @ (stance.body.rotation @ wrench[:3])) / (gravity * force)
-        # within 20° of up it holds the robot's weight
-        unit = _force_unit(force / weight) if up > 0.94 and force != 1.0 else None
-        if unit is not None:
-            message = f"it holds up {force:.3g} N, the robot weighs {weight:.4g} N"
-            yield _finding(field, f"{message}: is it in N, or in {unit}?", force, "N")
-    lever = max(force, on_earth)
-    if moment > SCENE_SETTINGS.widest * robot.reach * lever:
-        message = f"a moment of {moment:.3g} N·m is that of {lever:.4g} N at {moment / lever:.3g} m"
-        yield _finding(field, f"{message}: is it in N·m?", moment, "N·m")
-
-
-def _force_unit(part: float) -> str | None:
+def force_unit(part: float) -> str | None:
     """Return the unit in which a force that is such a part of the weight would be the weight."""
     # each with the factor that it may be off, as a body may carry and accelerate; a number in kgf
     # is only a tenth of that in N, and has to be nearer
@@ -129,7 +96,7 @@ def _load(question: Question) -> Iterator[Finding]:
         if not SCENE_SETTINGS.in_thousands < part < SCENE_SETTINGS.in_thousandths:
             message = (
                 f"{load.mass:.4g} kg are {part:.2g} times what the robot weighs, {robot.mass:.4g} "
-                "kg: is it in kg?"
+                f"kg: is it in kg, or in {'t' if part < 1.0 else 'g'}?"
             )
             yield _finding("load.mass", message, load.mass, "kg")
     if load.com is not None:
@@ -142,10 +109,11 @@ def _load(question: Question) -> Iterator[Finding]:
             yield _finding("load.com", message, away, "m")
     for i, payload in enumerate(load.payloads):
         field, part = f"load.payloads[{i}]", payload.mass / robot.mass
-        if part > 5.0:  # 10 kg in g are far more
+        # 10 kg in g are far more than five robots
+        if part > 5.0 or part < SCENE_SETTINGS.least_payload:
             message = (
                 f"{payload.mass:.4g} kg are {part:.2g} times what the robot weighs, "
-                f"{robot.mass:.4g} kg: is it in kg?"
+                f"{robot.mass:.4g} kg: is it in kg, or in {'g' if part > 1.0 else 't'}?"
             )
             yield _finding(f"{field}.mass", message, payload.mass, "kg")
         away = math.hypot(*payload.com)
@@ -176,7 +144,8 @@ def _gravity(stance: Stance) -> Iterator[Finding]:
         yield _finding("stance.gravity", message, size, "m/s²")
 
 
-def _robot(robot: Robot) -> Iterator[Finding]:
+def robot_findings(robot: Robot) -> Iterator[Finding]:
+    """Yield what is odd about a robot's own numbers, which are then no measure of others."""
     field, hand = "stance.robot", robot.hand
     stone = scene_number("usual", "rock_density") * 4.0 / 3.0 * math.pi * robot.reach**3
     links = robot.mass - len(robot.limbs) * hand.mass
@@ -258,12 +227,17 @@ def _tensions(question: Question) -> Iterator[Finding]:
     if cap is not None and cap < nothing * most:
         message = f"{cap:.3g} N is next to nothing of the {most:.4g} N that a tendon holds"
         yield _finding("limits.tendon_tension", f"{message}: is it in N?", cap, "N")
+    for name in ("hold_margin", "palm_margin", "least_tension"):
+        least = getattr(question.limits, name)
+        if 0.0 < least < SCENE_SETTINGS.in_thousands * closing:
+            message = f"{least:.3g} N is next to nothing of the {closing:.3g} N that tendons close"
+            yield _finding(f"limits.{name}", f"{message} with: is it in N, or in kN?", least, "N")
     given = [(f"present.{limb}", each) for limb, each in question.present.items()]
     for i, hand in enumerate(stance.hands):
         tension = hand.grasp.closing_tension
         if hand.tendon_preload is not None:
             given.append((f"stance.hands[{i}].tendon_preload", hand.tendon_preload))
-        if tension is not None and _force_unit(tension / closing) == "kgf":
+        if tension is not None and force_unit(tension / closing) == "kgf":
             message = (
                 f"it closes with {tension:.4g} N, hands do with {closing:.3g} N: is "
                 "it in N, or in kgf?"

@@ -18,7 +18,7 @@ from planner.floating import SETTINGS
 from planner.prepare import PreparedStance, checked_question, prepare_stance
 from planner.programs import CAP_SLACK, LOAD_UNIT
 from planner.question import Question
-from planner.result import LoadFactor, Plan, Time
+from planner.result import Finding, LoadFactor, Plan, Time
 from planner.solving.explained import explained_plan, reason_beyond, unexplained
 from planner.solving.fixed_wrists import FixedSolution, fixed_solutions, nearest_solutions
 from planner.solving.floating_wrists import (
@@ -322,6 +322,11 @@ class KnownStance:
         if prepared.where is None and question.stance.joints is None and not prepared.floating:
             self._checks = prepare_checks(prepared)
 
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Findings about the stance and the numbers of its question, whatever the body wrench."""
+        return (self._checks or prepare_checks(self.prepared)).findings
+
     def plan(self, body_wrench: Array) -> Plan:
         """Answer for another body wrench, like `planner.solving.plan`, but without advice.
 
@@ -368,7 +373,7 @@ def with_advice(question: Question, answer: Plan) -> Plan:
     """Return a plan with advice added: changes of the question that would help.
 
     If the deadline cuts the search off, ``advice`` is added to the unfinished results, with a
-    warning. No advice is searched for while a finding doubts the unit of a number; a warning names
+    warning. No advice is searched for while a finding doubts a number; a warning names
     the number.
 
     Parameters
@@ -378,9 +383,9 @@ def with_advice(question: Question, answer: Plan) -> Plan:
         The question's plan.
     """
     start = time.perf_counter()
-    odd = [each.field for each in answer.findings if each.kind == "unit"]
+    odd = [each.field for each in answer.findings if each.doubts_number]
     if odd:
-        warning = f"no search for advice while a unit is in doubt: {', '.join(odd)}"
+        warning = f"no search for advice while a number is in doubt: {', '.join(odd)}"
         return replace(answer, advice=(), warnings=(*answer.warnings, warning))
     found, whole = advise(question, try_stance)
     seconds, unfinished, warnings = deadline.seconds(), answer.unfinished, answer.warnings

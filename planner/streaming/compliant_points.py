@@ -6,7 +6,7 @@ import time
 
 from hand_models.base import Array, UnsupportedError
 from planner.question import Question
-from planner.result import SetPoints
+from planner.result import Finding, SetPoints
 from planner.solving import KnownStance
 from planner.streaming.answered_points import PointsAfterSlips, answered_points
 
@@ -44,6 +44,11 @@ class CompliantPoints:
         self.first = known.prepared.wrench
         self.limbs = known.prepared.limbs
         self.columns = tuple([space.columns for space in known.prepared.hands.spaces])
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Findings about the stance and the numbers of its question."""
+        return self._known.findings
 
     def close(self) -> None:
         """Do nothing: there is no thread to end."""

@@ -22,7 +22,7 @@ from hand_models.base import Array
 from hand_models.hand import FINGERS
 from planner.programs import CAP_SLACK
 from planner.question import Question
-from planner.result import SetPoints, SetPointSource
+from planner.result import Finding, SetPoints, SetPointSource
 from planner.streaming.answered_points import PointsAfterSlips
 from planner.streaming.interpolation import Interpolation
 from planner.streaming.prefetch import Mixture, Prefetch
@@ -63,6 +63,11 @@ class InterpolatedPoints:
     def first(self) -> Array:
         """Body wrench of the question, in B, shape (6,) [N, N·m]."""
         return self._stance.first
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Findings about the stance and the numbers of its question."""
+        return self._stance.known.findings
 
     @property
     def newest(self) -> Interpolation | None:

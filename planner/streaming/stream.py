@@ -26,6 +26,7 @@ from hand_models.base import (
 )
 from planner.question import LostTile, Question, checked_body_wrench
 from planner.result import SetPoints
+from planner.scene import WrenchCheck, wrench_findings
 from planner.solving import MaxMargin, objective_of
 from planner.streaming.answered_points import PointsAfterSlips
 from planner.streaming.compliant_points import CompliantPoints
@@ -56,6 +57,8 @@ class WrenchStream:
     ----------
     question : Question
     radius : float
+    findings : tuple of Finding
+        Findings about the stance, the numbers of its question and its first body wrench.
 
     Raises
     ------
@@ -77,6 +80,7 @@ class WrenchStream:
             self._source = CompliantPoints(question)
         else:
             self._source = InterpolatedPoints(question, self.radius)
+        self._odd = WrenchCheck(question)
         self._lock = threading.Lock()
         self._last: SetPoints | None = None
         self._closed = False
@@ -85,6 +89,7 @@ class WrenchStream:
         self._lost = tuple(lost)
         self._slips: PointsAfterSlips | UnsupportedError
         try:
+            self.findings = (*self._source.findings, *wrench_findings(question))
             self._slips = self._source.after_slips()
         except UnsupportedError as refused:
             self._slips = refused
@@ -187,6 +192,8 @@ class WrenchStream:
                 raise self._slips
             else:
                 found = self._slips.find(wrench, lost)
+            if odd := self._odd.findings(wrench):
+                found = replace(found, findings=odd)
             self._last, self._key = _frozen(found), key
             return found
 

@@ -146,6 +146,7 @@ class Streams:
                 utilisation=finite(first.utilisation),
                 gap=finite(first.gap),
                 hands=[HandColumns(limb=limb, columns=columns) for limb, columns in named],
+                findings=list(stream.findings),
                 took=time.perf_counter() - start,
             )
             # a stream whose reply cannot be encoded would be kept without a client
@@ -270,6 +271,8 @@ def set_points_reply(
     if points.lost:
         reply.lost, reply.save_first = list(points.lost), points.save_first
         reply.released = [ReleasedFinger(limb=limb, finger=each) for limb, each in points.released]
+    if points.findings:
+        reply.findings = list(points.findings)
     return brief_set_points(reply) if detail == "set_points" else reply
 
 

@@ -37,7 +37,8 @@ def stream_command(stance: str, radius: float, own: options.Own, as_json: bool) 
     each {"limb", "finger", "phalanx"}. Blank lines are skipped. Plans are prepared first about the
     body wrench or the load of STANCE; with compliant wrists each line is solved by itself, and only
     --json has their poses. Floating wrists are refused. A line that is no body wrench is reported
-    on standard error, with --json by an error in its place, and the next line is read. Below
+    on standard error, with --json by an error in its place, and the next line is read. What is odd
+    about STANCE, and a unit or a direction of a line that is in doubt, is said there once. Below
     set-points without lost tiles, or beyond the cap, are the hand to save first, the fingers taken
     off the rock, and the reason.
 
@@ -56,6 +57,9 @@ def stream_command(stance: str, radius: float, own: options.Own, as_json: bool) 
         if not as_json:
             width = tables.console().width
             _say_columns(source, width)
+        for each in source.findings:
+            (tables.note if each.doubts_number else tables.remark)(f"warning: {each.message}")
+        doubted = {(each.kind, each.unit) for each in source.findings if each.doubts_number}
         for number, line in enumerate(sys.stdin.buffer, start=1):
             if not line.strip():
                 continue
@@ -71,6 +75,10 @@ def stream_command(stance: str, radius: float, own: options.Own, as_json: bool) 
                     tables.note(f"line {number}: {error}")
                 continue
             reply = answering.set_points_reply(stance, source, points, start)
+            for each in points.findings:
+                if (each.kind, each.unit) not in doubted:
+                    tables.note(f"line {number}: warning: {each.message}")
+                    doubted.add((each.kind, each.unit))
             if as_json:
                 tables.say(reply)
             else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec import UNSET, Struct, UnsetType
 
-from planner import LostTile
+from planner import Finding, LostTile
 from service.replies.plan import HandSetPoints
 from service.replies.reply import ErrorDetail, Reply, StanceReply, Vector
 
@@ -40,6 +40,8 @@ class StreamReply(StanceReply, kw_only=True):
     - ``gap``: proven bound: no plan has a utilisation lower than this one by more than ``gap``; of
       compliant wrists, no plan nearby. Null without a plan.
     - ``hands``: the hands in order, with the names of their loads.
+    - ``findings``: what is odd about the stance, its load and ``body_wrench``, each with its
+      ``field`` in the request.
     - ``took``: time that the declaration took [s].
     """
 
@@ -52,6 +54,7 @@ class StreamReply(StanceReply, kw_only=True):
     gap: float | None
     hands: list[HandColumns]
     took: float
+    findings: list[Finding] = []
 
 
 class ReleasedFinger(Struct, kw_only=True):
@@ -86,6 +89,8 @@ class SetPointsReply(Reply, kw_only=True):
       slacken their tendons. Left out where no tile has slipped.
     - ``save_first``: where the set-points after slips are beyond the cap, limb of the hand on whose
       limits that depends most; left out or null otherwise.
+    - ``findings``: what is odd about ``body_wrench``: its unit, or its direction; left out where
+      nothing is.
     """
 
     stream: str
@@ -101,6 +106,7 @@ class SetPointsReply(Reply, kw_only=True):
     lost: list[LostTile] | UnsetType = UNSET
     released: list[ReleasedFinger] | UnsetType = UNSET
     save_first: str | UnsetType | None = UNSET
+    findings: list[Finding] | UnsetType = UNSET
 
 
 class PublishedReply(Struct, kw_only=True):

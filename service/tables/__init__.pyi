@@ -6,7 +6,12 @@ from .certificates import (
     certificate_json as certificate_json,
     print_certificate as print_certificate,
 )
-from .command_line import ExitStatus as ExitStatus, note as note
+from .command_line import (
+    ExitStatus as ExitStatus,
+    note as note,
+    note_doubts as note_doubts,
+    print_oddities as print_oddities,
+)
 from .extras import (
     print_advice as print_advice,
     print_route_survival as print_route_survival,

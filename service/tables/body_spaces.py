@@ -11,6 +11,7 @@ from rich.text import Text
 from planner import OTHER_COMPONENTS, WRENCH_COMPONENTS
 from service import replies
 from service.replies import BodySpaceReply
+from service.tables.command_line import print_oddities
 from service.tables.layout import (
     PrintedColumn,
     axis_unit,
@@ -18,7 +19,6 @@ from service.tables.layout import (
     name,
     number,
     print_rows,
-    print_warnings,
     text,
 )
 
@@ -43,7 +43,7 @@ def print_body_space(reply: BodySpaceReply, out: Console, accelerations: int = 0
     known = f"{used}   {1e3 * reply.time.total:.0f} ms"
     out.print(Text.assemble(in_colour(reply.status, reply.status.upper()), known))
     out.print(reply.reason)
-    print_warnings(reply.warnings, out)
+    print_oddities(reply.warnings, reply.findings, out)
     if isinstance(reply.com_region, replies.ComRegionReply):
         print_com_region(reply.com_region, out, accelerations)
         return

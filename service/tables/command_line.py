@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import sys
 import textwrap
+from collections.abc import Iterable
 from enum import IntEnum
+from typing import TYPE_CHECKING
 
 import click
 
-from service.tables.layout import console
+from service.tables.layout import console, print_warnings, verbosity
 
-__all__ = ["ExitStatus", "note"]
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from planner import Finding
+
+__all__ = ["ExitStatus", "note", "note_doubts", "print_oddities"]
 
 
 class ExitStatus(IntEnum):
@@ -48,3 +55,26 @@ def note(message: str) -> None:
         width = console(stderr=True).width
         line = textwrap.fill(line, width, break_long_words=False, break_on_hyphens=False)
     click.echo(line, err=True)
+
+
+def note_doubts(findings: Iterable[Finding]) -> None:
+    """Print each finding that doubts a number on standard error, once."""
+    for message in dict.fromkeys(each.message for each in findings if each.doubts_number):
+        note(f"warning: {message}")
+
+
+def print_oddities(warnings: Iterable[str], findings: Iterable[Finding], out: Console) -> None:
+    """Print all warnings; with the verbosity -1, note only findings that doubt a number.
+
+    Parameters
+    ----------
+    warnings : iterable of str
+        Sentences, those of the findings among them.
+    findings : iterable of Finding
+    out : Console
+        Console to print on.
+    """
+    if verbosity() < 0:
+        note_doubts(findings)
+    else:
+        print_warnings(warnings, out)

@@ -80,7 +80,8 @@ def print_robust(robust: replies.RobustCapability, out: Console) -> None:
         f"what is left of that at {robust.draws} places "
         f"within {1e3 * robust.position:g} mm and {1e3 * robust.angle:g} mrad"
     )
-    _print_ends({"99 in 100 ": robust.hundredth, "9 in 10 ": robust.tenth}, title, out)
+    legend = ["each column is a quantile by itself: a row's least may be above its most"]
+    _print_ends({"99 in 100 ": robust.hundredth, "9 in 10 ": robust.tenth}, title, out, legend)
     if robust.without:
         out.print(f"at {robust.without} of them the hand cannot be, or holds nothing: 0 there")
     if robust.pure_tenth and robust.share:

@@ -16,6 +16,7 @@ from rich.text import Text
 import planner
 from service import replies
 from service.tables.body_spaces import print_com_region
+from service.tables.command_line import note_doubts, print_oddities
 from service.tables.extras import (
     print_open_loop,
     print_spread,
@@ -70,6 +71,7 @@ def print_plan(
         print_spread(spread, out)
     out.print(reply.reason)
     if brief:
+        note_doubts(reply.findings)
         _print_displaced(reply, out)
         return
     print_warnings(reply.warnings, out)
@@ -354,7 +356,8 @@ def print_route(
                 'The route has no joints, and its stages are planned without; with "joints": '
                 '"solve" in its stance they are planned with those of the climb.'
             )
-    print_warnings(summary["warnings"], out)
+    findings = [each for plan in result.plans for each in plan.findings]
+    print_oddities(summary["warnings"], findings, out)
     out.print(summary["crux"]["sentence"])
     for what, path in files.items():
         out.print(f"{what}: {path}", soft_wrap=True)

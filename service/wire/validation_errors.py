@@ -82,8 +82,9 @@ def validation_error(
             # print a bound such as π with 6 digits, not with all digits of a double
             message = re.sub(r"\d+\.\d{6,}", lambda number: f"{float(number[0]):.6g}", message)
             unit = _unit_of(places)
+            bound = float(complaint.rpartition(" ")[2].rstrip("`"))
             message += f", in {unit}" if unit else ""
-            message += _got(document, where, unit)
+            message += _got(document, where, unit, bound)
         elif complaint.startswith("Expected `object`, got") and (known := field_names(types)):
             message += f"; an object with {', '.join(known)} is wanted"
         elif where is not None and re.fullmatch(
@@ -214,8 +215,10 @@ def _given(document: Callable[[], Any], where: Iterable[str | int]) -> Any:
         return None
 
 
-def _got(document: Callable[[], Any], where: Iterable[str | int] | None, unit: str | None) -> str:
-    """Return the number that is out of range, and the unit that it is likely to be in."""
+def _got(
+    document: Callable[[], Any], where: Iterable[str | int] | None, unit: str | None, bound: float
+) -> str:
+    """Return the number that is beyond a bound, and the unit that it is likely to be in."""
     value = None if where is None else _given(document, where)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return ""
@@ -233,7 +236,34 @@ def _got(document: Callable[[], Any], where: Iterable[str | int] | None, unit: s
         )
     elif unit == "m" and abs(value) >= many:
         asked = "; in mm?"
+    elif unit is None and bound == 1.0 and 1.0 < value <= 100.0:  # of a share, a percentage
+        asked = f"; in %? {value:g} % are {value / 100.0:g}"
+    elif other := _other_unit(value, unit, bound):
+        asked = f"; in {other}?"
     return f", got {value:.10g}{asked}"
+
+
+def _other_unit(value: float, unit: str | None, bound: float) -> str | None:
+    """Return another unit in which a number that is beyond a bound would be within it."""
+    match unit:
+        case "m":
+            other, factor = "mm", 1e-3
+        case "kg":
+            other, factor = "g", 1e-3
+        case "m/s²":
+            other, factor = "mm/s²", 1e-3
+        case "N·m":
+            other, factor = "N·mm", 1e-3
+        case "N/m":
+            other, factor = "N/mm", 1e3
+        case _:
+            return None
+    # of zero, and across zero, no unit makes anything else
+    if not value * bound > 0.0:
+        return None
+    size, most = abs(value), abs(bound)
+    within = size * factor <= most < size if factor < 1.0 else size < most <= size * factor
+    return other if within else None
 
 
 def _values(types: Iterable[inspect.Type]) -> list[str]:

@@ -373,4 +373,4 @@ def test_nothing_is_advised_that_is_far_from_holding_or_while_a_unit_is_in_doubt
     in_millimetres = replace(asked, load=Load(com=(0.33, -0.82, -132.9)))
     answer = plan(in_millimetres)
     assert answer.advice == ()
-    assert answer.warnings[-1] == "no search for advice while a unit is in doubt: load.com"
+    assert answer.warnings[-1] == "no search for advice while a number is in doubt: load.com"
