@@ -198,8 +198,14 @@ def _nothing_left(scan: Scan, made: Triangulated, hole: float) -> InvalidInputEr
             return InvalidInputError(
                 f"{message}, {open_}; --hole {wider:g} bridges them", field="hole"
             )
+        covered = made.gaps.covered(wider)
+        if covered >= table.scalar("mesh", "least_covered"):
+            return InvalidInputError(
+                f"{message}, {open_}; --hole {wider:g} bridges {100.0 * covered:.0f} % of the area",
+                field="hole",
+            )
     return InvalidInputError(
-        f"{message}, {open_}; scan the rock with points less than that hole apart", field="hole"
+        f"{message}, {open_}; scan the rock with points nearer to each other", field="hole"
     )
 
 

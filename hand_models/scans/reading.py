@@ -225,30 +225,54 @@ def _check_digits(points: Array, scale: float, path: Path) -> None:
     """
     largest = float(np.abs(points).max())
     coarsest = scan_table().scalar("scan", "coarsest")
-    step = float(np.spacing(np.float32(largest)))
-    if scale * step > coarsest and np.array_equal(points, points.astype(np.float32)):
-        raise InvalidInputError(
-            f"coordinates up to {largest:,.0f} are in steps of {step:g} {_of_unit(scale)}, as "
-            "floats of 32 bits are at that size: subtract an offset (shift to a local origin) "
-            f"before the export, or export 64-bit floats (double): {path}",
-            field="file",
-        )
-    # that programs write by default: C++ streams and %g, and floats of 32 bits
-    for digits in (6, 7):
-        step = 10.0 ** (math.floor(math.log10(max(largest, 1e-300))) + 1 - digits)
-        if scale * step <= coarsest:
-            return
-        cut = points[:, np.abs(points).max(axis=0).argmax()]
-        if np.allclose(cut, step * np.round(cut / step), rtol=1e-12, atol=0.0):
-            distinct = len(np.unique(points, axis=0))
-            # so few places that digits are taken to be lost
-            if distinct <= 0.9 * len(points):
-                raise InvalidInputError(
-                    f"coordinates up to {largest:,.0f} have {digits} digits, steps of {step:g} "
-                    f"{_of_unit(scale)}, and {len(points):,} points are at {distinct:,} places: "
-                    f"write more digits, or subtract an offset before the export: {path}",
-                    field="file",
-                )
+    axis = int(np.abs(points).max(axis=0).argmax())
+    single = float(np.spacing(np.float32(largest)))
+    too_few = InvalidInputError(
+        f"coordinates up to {largest:,.0f} are in steps of {single:g} {_of_unit(scale)}, as "
+        "floats of 32 bits are at that size: subtract an offset (shift to a local origin) "
+        f"before the export, or export 64-bit floats (double): {path}",
+        field="file",
+    )
+    if scale * single > coarsest and np.array_equal(points, points.astype(np.float32)):
+        raise too_few
+    # of digits that programs write by default (C++ streams and %g, floats of 32 bits, and more),
+    # and of floats that were converted to text
+    whole = math.floor(math.log10(max(largest, 1e-300))) + 1
+    steps: dict[float, int | None] = {10.0 ** (whole - digits): digits for digits in (6, 7, 8)}
+    steps[single] = None
+    for step in sorted(steps, reverse=True):
+        if scale * step <= coarsest or not _in_steps(points[:, axis], step):
+            continue
+        if (digits := steps[step]) is None:
+            if _alone_in_steps(points, axis, step):
+                raise too_few
+            continue
+        distinct = len(np.unique(points, axis=0))
+        # so few places that digits are taken to be lost
+        if distinct <= 0.9 * len(points) or _alone_in_steps(points, axis, step):
+            raise InvalidInputError(
+                f"coordinates up to {largest:,.0f} have {digits} digits, steps of {step:g} "
+                f"{_of_unit(scale)}, and {len(points):,} points are at {distinct:,} places: "
+                f"write more digits, or subtract an offset before the export: {path}",
+                field="file",
+            )
+
+
+def _in_steps(numbers: Array, step: float) -> bool:
+    return np.allclose(numbers, step * np.round(numbers / step), rtol=1e-12, atol=0.0)
+
+
+def _alone_in_steps(points: Array, axis: int, step: float) -> bool:
+    """Return whether coordinates along one axis vary in steps, and along no other axis.
+
+    Those of a grid are in steps along two.
+    """
+    others = np.delete(points, axis, axis=1).T
+    return (
+        bool(np.ptp(points[:, axis]))
+        and _in_steps(points[:, axis], step)
+        and not any(_in_steps(each, step) for each in others)
+    )
 
 
 def _of_unit(scale: float) -> str:

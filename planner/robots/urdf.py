@@ -273,8 +273,17 @@ def _numbers(
         wanted = "a number" if count == 1 else f"{count} numbers"
         got = shorten(raw, 100, placeholder=" …")
         units = {("origin", "xyz"): "m", ("origin", "rpy"): "rad", ("mass", "value"): "kg"}
-        within = f"±{largest:g} {units.get((element.tag, attribute), '')}".rstrip()
-        raise InvalidInputError(f"{place} must be {wanted} within {within}, got {got!r}")
+        units |= dict.fromkeys((("limit", "lower"), ("limit", "upper")), "rad (sliding: m)")
+        unit = units.get((element.tag, attribute), "")
+        # a number that is too large may be in the unit of those who do not use SI
+        slips = {
+            "m": "; in mm?",
+            "rad": "; in degrees?",
+            "rad (sliding: m)": "; in degrees, or mm?",
+        }
+        slip = slips.get(unit, "") if len(numbers) == count else ""
+        within = f"±{largest:g} {unit}".rstrip()
+        raise InvalidInputError(f"{place} must be {wanted} within {within}, got {got!r}{slip}")
     return numbers
 
 

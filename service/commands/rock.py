@@ -254,8 +254,8 @@ def _open_warnings(
     if many and made.covered < 0.99:
         gaps = f"gaps over {100.0 * (1.0 - made.covered):.0f} % of the outline"
         wide = 0.0 if made.gaps is None else made.gaps.gap(hole)
-        # so much farther apart in one direction than in the other
-        if pieces and 3.0 * made.spacing < wide < 0.25 * made.extent.max():
+        # so much farther apart than points at random, of which that is four times the distance
+        if pieces and 5.0 * made.spacing < wide < 0.25 * made.extent.max():
             apart = f"{1e3 * made.spacing:.2g} mm apart"
             gaps += f" (points are {apart}, in lines or patches {1e3 * wide:.0f} mm apart)"
         some.append(gaps)
@@ -263,7 +263,10 @@ def _open_warnings(
     if strays:
         points = tables.counted(made.alone, "point")
         found = f"{points} before or behind the rock, joined to nothing, may be stray; {found}"
-    yield found + _advice(scan, made, hole, spacing)
+    advice = _advice(scan, made, hole, spacing)
+    # what few such points leave open where none of the options helps are edges of the rock
+    if many or advice.startswith(":"):
+        yield found + advice
 
 
 def _far_away(pose: Pose) -> Iterator[str]:

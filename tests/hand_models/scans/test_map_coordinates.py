@@ -80,6 +80,20 @@ def test_numbers_that_were_written_with_few_digits_are_named(digits, offset, tmp
         read_scan(path, view=(0, 1, 0))
 
 
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("form", "words"), [("%.8g", "have 8 digits"), (None, "floats of 32 bits")]
+)
+def test_steps_of_the_largest_coordinate_alone_are_named(form, words, seed, tmp_path):
+    """Of scattered points no two are at one place, whatever is lost of one coordinate."""
+    points = np.random.default_rng(seed).uniform(-0.3, 0.3, (2000, 3)) + OFFSETS[0]
+    if form is None:
+        points, form = points.astype(np.float32).astype(float), "%.5f"
+    np.savetxt(tmp_path / "wall.xyz", points, fmt=form)
+    with pytest.raises(InvalidInputError, match=words):
+        read_scan(tmp_path / "wall.xyz", view=(0, 1, 0))
+
+
 def test_a_regular_table_in_map_coordinates_is_none_of_these(tmp_path):
     path = tmp_path / "wall.xyz"
     np.savetxt(path, wall(0.01) + OFFSETS[0], fmt="%.2f")
