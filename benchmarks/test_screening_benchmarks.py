@@ -10,7 +10,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from planner.reach import LimbChain, Starts, reach_poses
+from planner.limbs import LimbChain
+from planner.reach import Starts, reach_poses
 from planner.robots import robosimian
 from planner.screening import ScreeningTable, StanceIndices, learn, solve_stance
 from tests.suite.helpers.walls import random_wall

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hand_models.base import Array, Pose, wrench_transport
+from planner.limbs import LimbChain
 from planner.prepare import torque_limits
 from planner.programs import WRENCH_UNIT, SilentHighs
 from planner.question import EARTH_GRAVITY, Limits, Question, Stance
-from planner.reach import LimbChain
 from planner.search import State, Wall
 
 __all__ = ["JointLoadPrograms", "LimbLoads"]

@@ -1,20 +1,20 @@
 """One branch of a limb's inverse kinematics kept along a path of hand poses, and several to choose.
 
-The step to the next pose is Newton's of least norm (kinematics by Pinocchio). A limb of more than
-six joints also moves a little along directions that leave its hand where it is, as much as its
-joints turn anyway: off its limits and off postures in which its hand cannot move every way.
+The step to the next pose is Newton's of least norm. A limb of more than six joints also moves a
+little along directions that leave its hand where it is, as much as its joints turn anyway: off its
+limits and off postures in which its hand cannot move every way.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from hand_models.base import Array, InvalidInputError, Pose, turns_about
+from hand_models.base import Array, InvalidInputError, Pose
 from planner import deadline
+from planner.limbs import LimbChain
 from planner.motion.settings import MOTION_SETTINGS
 from planner.robots import LimbBatch, Robot, damped_step, postures_near
 
@@ -77,98 +77,40 @@ def pose_between(first: Pose, second: Pose, part: float) -> Pose:
     """
     turn = pin.log3(first.rotation.T @ second.rotation)
     place = first.position + part * (second.position - first.position)
-    return Pose(place, first.rotation @ turns_about(part * turn))
+    return Pose(place, first.rotation @ pin.exp3(part * turn))
 
 
 class _Limb:
-    """A limb's kinematics, by Pinocchio."""
+    """A limb that follows its hand's poses."""
 
     def __init__(self, robot: Robot, limb: str) -> None:
+        settings = MOTION_SETTINGS
         self.limb, self.chain = limb, robot.chains[limb]
-        self._robot, self._q = robot, robot.configuration({})
-        self._still = self.target(Pose.identity())
-
-    def target(self, pose: Pose) -> Any:
-        """Return a pose of H in B as Pinocchio's, in the root link."""
-        there = self._robot.root @ pose
-        return pin.SE3(there.rotation, there.position)
-
-    def errors(self, angles: Array, target: Any) -> tuple[Array, Array]:
-        """Return the twist in H to a target, (6,), over the reach, and its Jacobian (6, n)."""
-        model, data, chain = self._robot.model, self._robot.data, self.chain
-        chain.turn(self._q, angles)
-        pin.computeJointJacobians(model, data, self._q)
-        off = pin.updateFramePlacement(model, data, chain.frame).actInv(target)
-        jacobian = pin.getFrameJacobian(model, data, chain.frame, pin.ReferenceFrame.LOCAL)
-        J = jacobian[:, chain.columns] @ chain.coupling
-        error = np.concatenate([off.translation, pin.log3(off.rotation)])
-        error[:3] /= chain.reach
-        J[:3] /= chain.reach
-        return error, J
+        self._robot, self._compiled = robot, LimbChain.of(robot, limb)
+        self._numbers = np.array([settings.pose_error, settings.largest_step, settings.slope_step])
 
     def follow(self, start: Array, pose: Pose) -> Array | None:
-        """Return angles near others that solve a pose; None if none are near enough."""
-        target, chain, settings = self.target(pose), self.chain, MOTION_SETTINGS
-        angles = start
-        for k in range(settings.newton_steps):
-            error, J = self.errors(angles, target)
-            if np.abs(error).max() <= settings.pose_error:
-                return angles
-            free = np.ones(len(angles))
-            for _ in range(len(angles)):
-                step = _least_step(J * free, error)
-                # a joint at a limit that it would leave stays there
-                stuck = (angles <= chain.lower) & (step < 0.0)
-                stuck |= (angles >= chain.upper) & (step > 0.0)
-                if not stuck.any():
-                    break
-                free[stuck] = 0.0
-            if k == 0:
-                # as much as the joints turn anyway
-                step = step + self._drift(start, J) * np.abs(step).max()
-            angles = np.clip(angles + step, chain.lower, chain.upper)
-            if np.abs(angles - start).max() > settings.largest_step:
-                return None
-        return None
+        """Return angles near others that solve a pose of H in B; None if none are near enough."""
+        return self._compiled.follow(pose, start, self._numbers, MOTION_SETTINGS.newton_steps)
 
-    def _drift(self, angles: Array, J: Array) -> Array:
-        """Return the motion that leaves the hand and eases the limb, (n,), at most 1 a joint.
-
-        It goes down the slope of −½ log det J Jᵀ − Σ log (room of a joint in its range), in
-        directions that leave the hand where it is, so that a redundant limb keeps off its limits
-        and off postures in which it cannot move every way.
-        """
-        chain, drift = self.chain, np.zeros(len(angles))
-        if len(angles) <= len(J):
-            return drift
-        bounded = np.isfinite(chain.upper - chain.lower)
-        low, high = (angles - chain.lower)[bounded], (chain.upper - angles)[bounded]
-        slope, h = np.zeros(len(angles)), 1e-4  # [rad] of the difference quotient
-        slope[bounded] = 1.0 / np.maximum(high, h) - 1.0 / np.maximum(low, h)
-        for along in np.linalg.svd(J)[2][len(J) :]:
-            ends = [self._mobility(angles + side * h * along) for side in (-1.0, 1.0)]
-            rise = slope @ along - (ends[1] - ends[0]) / (2.0 * h)
-            drift -= along * np.clip(rise, -1.0, 1.0)
-        return drift
-
-    def _mobility(self, angles: Array) -> float:
-        """Return ½ log det J Jᵀ: the logarithm of how well the hand moves every way [1]."""
-        _, J = self.errors(angles, self._still)
-        return 0.5 * float(np.linalg.slogdet(J @ J.T + 1e-12 * np.eye(6))[1])
+    def _errors(self, angles: Array, pose: Pose) -> tuple[Array, Array]:
+        """Return the twist in H to a pose, (6,), over the reach, and its Jacobian (6, n)."""
+        batch = LimbBatch(self._robot, {self.limb: pose}, {}, np.zeros(3))
+        errors, jacobians = batch.errors(angles[None, None])
+        return errors[0, 0], jacobians[0, 0]
 
     def lacks_joints(self, angles: Array, pose: Pose) -> bool:
         """Return whether a limb of few joints misses a pose, were there no limits of joints."""
         if len(angles) >= 6:
             return False
-        target = self.target(pose)
         for _ in range(MOTION_SETTINGS.newton_steps):
-            error, J = self.errors(angles, target)
-            angles = angles + _least_step(J, error)
-        return bool(np.abs(self.errors(angles, target)[0]).max() > MOTION_SETTINGS.missed)
+            error, J = self._errors(angles, pose)
+            angles = angles + np.linalg.lstsq(J, error)[0]
+        return bool(np.abs(self._errors(angles, pose)[0]).max() > MOTION_SETTINGS.missed)
 
     def lacking(self, angles: Array, pose: Pose) -> str:
         """Say what keeps the limb from a pose, from the angles that it has."""
-        chain, (error, J) = self.chain, self.errors(angles, self.target(pose))
+        chain, (error, J) = self.chain, self._errors(angles, pose)
         within, slope = MOTION_SETTINGS.at_limit, error @ J
         low = (angles - chain.lower < within) & (slope < 0.0)
         high = (chain.upper - angles < within) & (slope > 0.0)
@@ -190,15 +132,6 @@ class _Limb:
         # what rounding leaves is no distance
         off = " and ".join(text for size, text in parts if size > 1e-6) or parts[0][1]
         return f"{', and '.join(stopped)}, {off} from the next pose"
-
-
-def _least_step(J: Array, error: Array) -> Array:
-    """Return the least step by which a hand's error vanishes, or gets least with few joints."""
-    small = J @ J.T if J.shape[1] > len(J) else J.T @ J
-    small = small + 1e-12 * np.eye(len(small))  # a stretched limb's is singular
-    if J.shape[1] > len(J):
-        return np.asarray(J.T @ np.linalg.solve(small, error))
-    return np.asarray(np.linalg.solve(small, J.T @ error))
 
 
 def follow_poses(robot: Robot, limb: str, start_angles: Array, poses: Sequence[Pose]) -> Array:

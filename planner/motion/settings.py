@@ -19,6 +19,8 @@ class MotionSettings:
     """Newton's steps from one pose to the next."""
     pose_error: float = 1e-11
     """Error of a pose that is followed, of the limb's reach [1] or [rad]."""
+    slope_step: float = 1e-4
+    """Difference quotient's step of how well a limb moves every way [rad]."""
     missed: float = 1e-6
     """Error of a pose beyond which a limb of few joints misses it, of its reach [1] or [rad]."""
     at_limit: float = 1e-3

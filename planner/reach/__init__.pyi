@@ -1,4 +1,3 @@
-from .limb_chain import LimbChain as LimbChain
 from .settings import REACH_SETTINGS as REACH_SETTINGS, ReachSettings as ReachSettings
 from .starts import Starts as Starts
 from .table import (

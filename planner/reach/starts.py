@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from hand_models.base import Array
-from planner.reach.limb_chain import LimbChain
+from planner.limbs import LimbChain
 from planner.reach.settings import REACH_SETTINGS
 
 __all__ = ["Starts"]

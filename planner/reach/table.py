@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, Pose, go_on, stored
 from planner import deadline
+from planner.limbs import LimbChain
 from planner.motion import CollisionScene, Rock, distances_from_rock
-from planner.reach.limb_chain import LimbChain
 from planner.reach.settings import REACH_SETTINGS
 from planner.reach.starts import Starts
 from planner.robots import Robot, scene_number
@@ -141,8 +141,6 @@ def reach_poses(
     DeadlineError
         If the deadline passes first.
     """
-    from planner.reach.compiled_kinematics import solve_poses
-
     settings = REACH_SETTINGS
     numbers = np.array(
         [
@@ -167,9 +165,7 @@ def reach_poses(
             some = left[at : at + settings.at_once]
             asked = np.ascontiguousarray(targets[some])
             near = starts.near(asked, first, end)
-            angles, found = solve_poses(
-                *chain[:9], chain.reach, asked, near, numbers, settings.steps, most
-            )
+            angles, found = chain.solve(asked, near, numbers, settings.steps, most)
             solved = np.arange(most) < found[:, None]
             owners, flat = np.repeat(some, found), angles[solved]
             if fits is not None and len(flat):

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from hand_models.base import Array, Pose
+from planner.limbs import LimbChain
 from planner.programs import WRENCH_UNIT
 from planner.question import EARTH_GRAVITY
-from planner.reach.limb_chain import LimbChain
 from planner.reach.table import ReachTable
 from planner.robots import Robot
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from hand_models.base import Pose, turns_about
+from planner.limbs import LimbChain
 from planner.motion import CollisionScene
 from planner.programs import WRENCH_UNIT
 from planner.reach import (
     REACH_SETTINGS,
-    LimbChain,
     Starts,
     body_wrenches,
     limb_moments,

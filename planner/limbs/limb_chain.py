@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array
+from hand_models.base import Array, Indices, Pose
 from planner.robots import Robot
 
 __all__ = ["LimbChain"]
@@ -61,7 +61,8 @@ class LimbChain(NamedTuple):
         turns = np.array([each.rotation for each in placements])
         shifts = np.array([each.translation for each in placements])
         turns[0], shifts[0] = root.rotation @ turns[0], root.apply(shifts[0])
-        motions = np.array([model.createData().joints[i].S.ravel() for i in chain.ids])
+        # the motion of a joint of one degree of freedom does not depend on where it is
+        motions = np.array([robot.data.joints[i].S.ravel() for i in chain.ids])
         place = model.frames[chain.frame].placement
         mount = robot.description.mounts[limb].pose
         inertias = [model.inertias[i] for i in chain.ids]
@@ -84,18 +85,51 @@ class LimbChain(NamedTuple):
 
     def frames(self, angles: Array) -> Array:
         """Return axes and origins (S, 3, 4) of H in B at joint angles (S, n)."""
-        from planner.reach.compiled_kinematics import hand_frames
-
-        return hand_frames(*self[:7], np.ascontiguousarray(angles))
+        last = self._joint_frames(angles)[:, -1]
+        found = last[:, :, :3] @ self.hand
+        found[:, :, 3] += last[:, :, 3]
+        return np.asarray(found)
 
     def centres(self, angles: Array) -> Array:
         """Return centres of mass (S, 3) of the limb with its hand, in B, at joint angles (S, n)."""
-        from planner.reach.compiled_kinematics import limb_centres
+        frames = self._joint_frames(angles)
+        places = (frames[..., :3] @ self.coms[:, :, None])[..., 0] + frames[..., 3]
+        return np.asarray(self.masses @ places / self.masses.sum())
 
-        return limb_centres(*self[:6], self.masses, self.coms, np.ascontiguousarray(angles))
+    def _joint_frames(self, angles: Array) -> Array:
+        from planner.limbs.compiled_kinematics import joint_frames
+
+        return joint_frames(*self[:6], np.ascontiguousarray(angles))
+
+    def follow(self, target: Pose, start: Array, numbers: Array, steps: int) -> Array | None:
+        """Return angles near others (n,) that put H on a pose in B [rad]; None without any.
+
+        ``numbers`` and ``steps`` are as of `compiled_kinematics.follow_pose`.
+        """
+        from planner.limbs.compiled_kinematics import follow_pose
+
+        asked = _axes_and_origin(target), start, numbers, steps
+        angles, found = follow_pose(*self[:9], self.reach, *asked)
+        return angles if found else None
+
+    def solve(
+        self, targets: Array, starts: Array, numbers: Array, steps: int, branches: int
+    ) -> tuple[Array, Indices]:
+        """Return angles (N, branches, n) for poses of H in B, and how many each has, (N,).
+
+        The parameters are those of `compiled_kinematics.solve_poses`.
+        """
+        from planner.limbs.compiled_kinematics import solve_poses
+
+        return solve_poses(*self[:9], self.reach, targets, starts, numbers, steps, branches)
 
     def spans(self, targets: Array) -> Array:
         """Return how far poses of H in B (N, 3, 4) are from the shoulder, over the reach, (N,)."""
         links = targets[:, :, :3] @ self.lever + targets[:, :, 3]
         found: Array = np.linalg.norm(links - self.shoulder, axis=1) / self.reach
         return found
+
+
+def _axes_and_origin(pose: Pose) -> Array:
+    """Return a pose as the array (3, 4) of its axes and origin."""
+    return np.column_stack([pose.rotation, pose.position])

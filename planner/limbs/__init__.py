@@ -1,0 +1,5 @@
+"""Compiled kinematics of single limbs: their constants, poses of hands, and followed paths."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

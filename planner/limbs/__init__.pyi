@@ -1,0 +1,1 @@
+from .limb_chain import LimbChain as LimbChain
