@@ -5,6 +5,7 @@ from .active_limits import (
     joint_name as joint_name,
     limit_name as limit_name,
     limit_unit as limit_unit,
+    most_used as most_used,
 )
 from .certificate import (
     certify as certify,

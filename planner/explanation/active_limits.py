@@ -26,6 +26,7 @@ __all__ = [
     "joint_name",
     "limit_name",
     "limit_unit",
+    "most_used",
 ]
 
 
@@ -34,7 +35,7 @@ class ExplanationTolerances:
     """Thresholds below which numbers of a plan or a certificate count as zero."""
 
     binding_multiplier: float = 1e-6  # of a limit that binds, at least
-    ranking_digits: int = 5  # decimals of multipliers; where alike, rows' order counts
+    ranking_digits: int = 5  # of multipliers and utilisations; where alike, rows' order counts
     weighing_multiplier: float = 1e-6  # in a proof, of which all add up to about one
     broken: float = 1e-7  # rows that must be broken by more have no loads, in scaled units
     kept: float = 2e-9  # rows that need not be broken by more have loads: the solver's rounding
@@ -68,6 +69,11 @@ def limit_unit(limit: str) -> str:
     if limit in ("motor_torque", FINGER_TWIST, JOINT_TORQUE):
         return "N·m"
     return "A" if limit == "motor_current" else "N"
+
+
+def most_used(used: Array) -> int:
+    """Return the index of the largest utilisation, of alike ones the first: no rounding decides."""
+    return int((used >= used.max() - 10.0**-TOLERANCES.ranking_digits).argmax())
 
 
 def limit_name(limb: str, row: Row) -> LimitName:

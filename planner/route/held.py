@@ -13,7 +13,7 @@ from msgspec import structs
 from hand_models.base import Array, Pose, wrench_transport
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from hand_models.hand import FINGERS
-from planner.explanation import joint_name, limit_name
+from planner.explanation import joint_name, limit_name, most_used
 from planner.prepare import FORCE_CAP, JointLoads, Posture, PreparedStance, assemble, posture_at
 from planner.programs import CAP_SLACK, LOAD_UNIT
 from planner.question import HandOnHold, Objective, Question, Stance
@@ -208,9 +208,9 @@ class HeldPosture:
             for limb, space in zip(self.prepared.limbs, self.prepared.hands.spaces, strict=True)
             for row in space.rows[: len(space.s)]
         ]
-        i = int(self.used.argmax())
+        most, i = float(self.used.max()), most_used(self.used)
         found: list[tuple[float, LimitName | None]] = [
-            (max(float(self.used[i]), 0.0), limit_name(*limits[i])),
+            (max(most, 0.0), limit_name(*limits[i])),
             *self.idle,
         ]
         moving = self.posed.moving

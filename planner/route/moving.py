@@ -12,7 +12,7 @@ from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.opening import HandPath, closing_path, opening_path
 from hand_models.wrench_spaces import WrenchSpace
-from planner.explanation import limit_name
+from planner.explanation import limit_name, most_used
 from planner.motion import (
     BranchEndError,
     CollisionScene,
@@ -90,7 +90,6 @@ def _states(
     rows = space.rows[: len(space.s)]
     apart = [row.limit.startswith("joint") or row.limit == FORCE_CAP for row in rows]
     used = np.where(apart, 0.0, used)
-    worst = int(used.argmax())
     return [
         MovingHand(
             limb=limb,
@@ -99,8 +98,8 @@ def _states(
             winch_angles=winches[k],
             wrench=wrenches[k],
             deviation=deviation[k],
-            utilisation=max(float(used[worst]), 0.0),
-            limiting=limit_name(limb, rows[worst]),
+            utilisation=max(float(used.max()), 0.0),
+            limiting=limit_name(limb, rows[most_used(used)]),
         )
         for k in range(len(wrenches))
     ]
