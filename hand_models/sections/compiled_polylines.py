@@ -26,6 +26,37 @@ def _from_segment(vertices: Array, at: int, s: float, t: float) -> tuple[float, 
     return part, x - part * u, y - part * v
 
 
+@compiled()
+def _blocks(vertices: Array, ends: Indices) -> tuple[Indices, Array, Array]:
+    """Return blocks of up to 16 neighbouring segments of polylines, in their order.
+
+    They are the first segment of each of b blocks and the one after its last, (b, 2); a circle
+    about them, (b, 3): its centre and radius, rounded up [m]; and their longest, (b,) [m].
+    """
+    each, count, begin = 16, 0, 0
+    for end in ends:
+        count += (end - begin + each - 2) // each
+        begin = end
+    spans, circles = np.empty((count, 2), dtype=np.intp), np.empty((count, 3))
+    longest, block, begin = np.full(count, 1e-9), 0, 0
+    for end in ends:
+        for first in range(begin, end - 1, each):
+            after = min(first + each, end - 1)
+            (left, low), (right, high) = vertices[first], vertices[first]
+            for i in range(first, after):
+                s, t = vertices[i + 1]
+                left, right, low, high = min(left, s), max(right, s), min(low, t), max(high, t)
+                x, y = s - vertices[i, 0], t - vertices[i, 1]
+                longest[block] = max(longest[block], math.sqrt(x * x + y * y))
+            spans[block, 0], spans[block, 1] = first, after
+            circles[block, 0], circles[block, 1] = 0.5 * (left + right), 0.5 * (low + high)
+            size = math.sqrt((right - left) ** 2 + (high - low) ** 2)
+            circles[block, 2] = 0.5 * size * (1.0 + 1e-12) + 1e-15
+            block += 1
+        begin = end
+    return spans, circles, longest
+
+
 @compiled("f2", "i1", "f2")
 def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Indices, Array, Array]:
     """Return the nearest segment to each of n points.
@@ -46,12 +77,7 @@ def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Ind
     away : ndarray, shape (n, 2)
         Vector (s, t) from that place to the point [m].
     """
-    longest, begin = 1e-9, 0  # [m] or else the longest segment
-    for end in ends:
-        for i in range(begin, end - 1):
-            x, y = vertices[i + 1, 0] - vertices[i, 0], vertices[i + 1, 1] - vertices[i, 1]
-            longest = max(longest, math.sqrt(x * x + y * y))
-        begin = end
+    spans, circles, longest = _blocks(vertices, ends)
     segments, parts = np.zeros(len(points), dtype=np.intp), np.zeros(len(points))
     away = np.empty((len(points), 2))
     nearest = 0
@@ -60,15 +86,18 @@ def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Ind
         # the segment nearest to the point before is near to this one
         _, x, y = _from_segment(vertices, nearest, s, t)
         least = math.sqrt(x * x + y * y) * (1.0 + 1e-12) + 1e-15  # [m] it is found once more
-        square, begin = math.inf, 0
-        for end in ends:
-            at, begin = begin, end
-            while at < begin - 1:
+        square = math.inf
+        for block in range(len(spans)):
+            x, y = s - circles[block, 0], t - circles[block, 1]
+            if math.sqrt(x * x + y * y) * (1.0 - 1e-12) - circles[block, 2] > least:
+                continue
+            at, end = spans[block]
+            while at < end:
                 x, y = s - vertices[at, 0], t - vertices[at, 1]
                 # what is within so many segments of a vertex that is farther is farther, too
                 beyond = math.sqrt(x * x + y * y) - least
-                if beyond > longest:
-                    at += int(beyond / longest)
+                if beyond > longest[block]:
+                    at += int(beyond / longest[block])
                     continue
                 part, x, y = _from_segment(vertices, at, s, t)
                 if x * x + y * y < square:
