@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from importlib.util import find_spec
 from pathlib import Path
@@ -26,7 +27,14 @@ settings.register_profile("repeatable", derandomize=True, deadline=None, max_exa
 settings.load_profile("repeatable")
 
 
-LONG = ("test_golden.py", "test_dispatcher.py", "test_service.py", "test_cli.py", "test_closing.py")
+LONG = (
+    *("test_golden.py", "test_climb_command.py", "test_closing.py", "test_blocks.py"),
+    *("test_advice.py", "test_moved_by_micrometres.py", "test_moved_rock.py", "test_widths.py"),
+    *("test_robust_load_factor.py", "test_search_benchmarks.py", "test_plain_opening.py"),
+    *("test_climb.py", "test_calibrate.py", "test_reliability.py", "test_random_plans.py"),
+    *("test_many_questions.py", "test_reply_sizes.py", "test_open_loop.py", "test_spread.py"),
+    *("test_dispatcher.py", "test_service.py", "test_cli.py", "test_ways_of_asking.py"),
+)
 """Files whose tests take longest together, which one process each goes through."""
 
 COLLECT = (sys.executable, "-m", "pytest", "--collect-only", "-q", "-n", "0")
@@ -66,8 +74,13 @@ def _uncompiled() -> list[str]:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with what takes long, so that no process is left alone with it at the end."""
-    items.sort(key=lambda item: item.path.name not in LONG)
+    """Begin with what takes long, so that no process is left alone with it at the end.
+
+    That is files of which it is known, and of others those with the most tests.
+    """
+    tests = Counter(item.path for item in items)
+    places = {name: place for place, name in enumerate(LONG)}
+    items.sort(key=lambda item: (places.get(item.path.name, len(LONG)), -tests[item.path]))
 
 
 @pytest.fixture

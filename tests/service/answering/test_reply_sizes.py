@@ -109,6 +109,7 @@ def test_what_a_detail_does_not_tell_is_not_named() -> None:
         pytest.param(["prices", "robust", "clearance"], marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.usefixtures("few_places")
 def test_what_was_asked_for_in_addition_is_named_with_its_size(
     want: list[str], form: Format
 ) -> None:
