@@ -51,7 +51,7 @@ def _blocks(vertices: Array, ends: Indices) -> tuple[Indices, Array, Array]:
             spans[block, 0], spans[block, 1] = first, after
             circles[block, 0], circles[block, 1] = 0.5 * (left + right), 0.5 * (low + high)
             size = math.sqrt((right - left) ** 2 + (high - low) ** 2)
-            circles[block, 2] = 0.5 * size * (1.0 + 1e-12) + 1e-15
+            circles[block, 2] = 0.5 * size + 1e-12 * (size + abs(left) + abs(low)) + 1e-15
             block += 1
         begin = end
     return spans, circles, longest
@@ -89,15 +89,14 @@ def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Ind
         square = math.inf
         for block in range(len(spans)):
             x, y = s - circles[block, 0], t - circles[block, 1]
-            if math.sqrt(x * x + y * y) * (1.0 - 1e-12) - circles[block, 2] > least:
+            if x * x + y * y > (least + circles[block, 2]) ** 2:
                 continue
             at, end = spans[block]
             while at < end:
                 x, y = s - vertices[at, 0], t - vertices[at, 1]
                 # what is within so many segments of a vertex that is farther is farther, too
-                beyond = math.sqrt(x * x + y * y) - least
-                if beyond > longest[block]:
-                    at += int(beyond / longest[block])
+                if x * x + y * y > (least + longest[block]) ** 2:
+                    at += max(int((math.sqrt(x * x + y * y) - least) / longest[block]), 1)
                     continue
                 part, x, y = _from_segment(vertices, at, s, t)
                 if x * x + y * y < square:
