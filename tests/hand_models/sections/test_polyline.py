@@ -143,7 +143,8 @@ def test_where_rock_ends_nothing_is_touched():
 def test_the_nearest_segment_is_found_among_all(seed):
     rng = np.random.default_rng(seed)
     pieces = [
-        np.cumsum(10.0 ** rng.uniform(-4.0, -1.0) * rng.normal(size=(n, 2)), axis=0)
+        # long segments beside short ones
+        np.cumsum(10.0 ** rng.uniform(-4.0, -1.0, (n, 1)) * rng.normal(size=(n, 2)), axis=0)
         for n in rng.integers(2, 60, rng.integers(1, 4))
     ]
     points = rng.normal(size=(30, 2)) * 10.0 ** rng.uniform(-3.0, 0.0)
