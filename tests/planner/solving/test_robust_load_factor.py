@@ -126,11 +126,10 @@ def asked_of(name: str, **kwargs) -> Question:
         (ask(on_wall(), "robust", limits=Limits(tendon_tension=150.0)), 4, 2),
         (asked_of("wall-300-joints"), 4, 2),
         (asked_of("ledge"), 4, 2),
-        pytest.param(asked_of("boulders"), 2, 2, marks=pytest.mark.slow),
         pytest.param(asked_of("wall-300"), 32, 2, marks=pytest.mark.slow),
         pytest.param(asked_of("boulders"), 16, 2, marks=pytest.mark.slow),
     ],
-    ids=["capped", "joints", "refused", "mesh", "wall-300", "boulders"],
+    ids=["capped", "joints", "refused", "wall-300", "boulders"],
 )
 def test_it_is_the_load_factor_of_stances_whose_rock_is_elsewhere(
     monkeypatch, asked, places, rounds
