@@ -75,6 +75,8 @@ def plan_command(
             f"--advice requires the full reply, got {request.detail!r}; remove detail",
             field="detail",
         )
+    if advice_folder is not None:
+        tables.fill_alone(advice_folder, "--advice")
     robots = own.robots
     brief = not as_json and tables.verbosity() < 0
     advised = "advice" in request.want
@@ -220,7 +222,6 @@ def _write_advice(
         request = given.files.named(request, given.request, folder)
     written = []
     with tables.filling_folder():
-        folder.mkdir(parents=True, exist_ok=True)
         for old in folder.glob("advice-*.json"):
             if old.stem.removeprefix("advice-").isdecimal():
                 old.unlink()

@@ -146,6 +146,7 @@ def rock_command(
         )
     if output.exists() and file.exists() and output.samefile(file):
         raise InvalidInputError(f"{output} is the scan itself; name another", field="--output")
+    tables.write_alone(output)
     with tables.progress(f"meshing {file.name}") as report:
         scan = scans.read_scan(file, **reading)
         if std_ratio is not None:

@@ -199,9 +199,7 @@ def search_climb(
     page: Path | None = None,
 ) -> int:
     """Search for a climb, write its files, and print the verdict; return the exit status."""
-    with tables.filling_folder():
-        folder.mkdir(parents=True, exist_ok=True)
-    tables.write_alone(folder / "climb", folder)
+    tables.fill_alone(folder)
     # a wall takes as long as some thousand plans
     on, workers = parallel.place(1000)
     found = climbs.seek(request, own.robots, on, workers, folder)
@@ -264,9 +262,7 @@ def _one(
     """Evaluate one route, and write its report, its page or both."""
     route = answering.route_of(asked.request, own.robots)
     if folder is not None:
-        with tables.filling_folder():
-            folder.mkdir(parents=True, exist_ok=True)
-        tables.write_alone(folder / "route", folder)
+        tables.fill_alone(folder)
     with tables.progress(f"planning the moves of {route.name}") as report:
         climb, lacks = _climb(route, report)
     with tables.progress(f"planning {route.name}") as report:

@@ -131,9 +131,7 @@ def study_command(
     chosen = _chosen_study(name, **wanted)
     numbers = None if hand is None else parameters.own_hand(hand)
     line = None if as_json else f"study {name}: started; it may take minutes"
-    with tables.filling_folder():
-        folder.mkdir(parents=True, exist_ok=True)
-    tables.write_alone(folder / "result.json", folder)
+    tables.fill_alone(folder)
     with tables.filling_folder(), tables.progress(name, line=line) as report:
         result, files = studies.run_study(chosen, folder, report, numbers)
     if as_json:

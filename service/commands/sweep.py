@@ -103,10 +103,8 @@ def sweep_command(
     if pair is not None:
         with errors_under("--over"):
             design.places_of(pair)
-    with tables.filling_folder():
-        folder.mkdir(parents=True, exist_ok=True)
+    tables.fill_alone(folder)
     table, picture = folder / "sweep.csv", folder / "sweep.png"
-    tables.write_alone(table, folder)
     with writing_answers(table):
         sink = sweeping.PointRows(request, design, seed or 0, table, resume, *own)
     left = design.count - sink.tally.count

@@ -44,7 +44,7 @@ from .layout import (
     verbosity as verbosity,
 )
 from .openings import print_opening as print_opening
-from .output_lock import write_alone as write_alone
+from .output_lock import fill_alone as fill_alone, write_alone as write_alone
 from .plans import print_plan as print_plan, print_route as print_route
 from .redundancy import print_redundancy as print_redundancy
 from .screening import (

@@ -1,4 +1,4 @@
-"""Lock the output file of a command, so that two runs cannot write to the same output."""
+"""Lock the output of a command, so that two runs cannot write to the same file or folder."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from pathlib import Path
 import click
 
 from hand_models.base import InvalidInputError
-from service.tables.terminal import remark, writing
+from service.tables.terminal import filling_folder, remark, writing
 
-__all__ = ["write_alone"]
+__all__ = ["fill_alone", "write_alone"]
 
 
-def write_alone(file: Path, output: Path | None = None) -> None:
+def write_alone(file: Path, output: Path | None = None, option: str = "-o") -> None:
     """Lock an output file against other processes until the running click command ends.
 
     The lock is a file ``.NAME.lock`` beside the output. Devices and pipes are not locked. On a file
@@ -28,25 +28,49 @@ def write_alone(file: Path, output: Path | None = None) -> None:
         File that the command writes.
     output : Path, optional
         Name of the output in error messages; by default ``file``.
+    option : str, optional
+        Option of the command that names the output.
 
     Raises
     ------
     InvalidInputError
         If another process has the lock, or the lock file cannot be written.
     """
-    click.get_current_context().with_resource(_alone_at(file, output or file))
+    click.get_current_context().with_resource(_alone_at(file, output or file, option))
+
+
+def fill_alone(folder: Path, option: str = "-o") -> None:
+    """Make an output folder, and lock it against other processes until the running command ends.
+
+    The lock is the file ``.crux.lock`` in the folder, whatever command fills it.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder that the command fills.
+    option : str, optional
+        Option of the command that names the folder.
+
+    Raises
+    ------
+    InvalidInputError
+        If another process has the lock, or the folder or the lock file cannot be written.
+    """
+    with filling_folder():
+        folder.mkdir(parents=True, exist_ok=True)
+    write_alone(folder / "crux", folder, option)
 
 
 @contextmanager
-def _alone_at(file: Path, output: Path) -> Iterator[None]:
+def _alone_at(file: Path, output: Path, option: str) -> Iterator[None]:
     target = file.resolve()
     if target.exists() and not (target.is_file() or target.is_dir()):
         # a pipe or a device
         yield
         return
     path = target.with_name(f".{target.name}.lock")
-    with writing(output, "-o"):
-        lock = _locked(path, output)
+    with writing(output, option):
+        lock = _locked(path, output, option)
     try:
         yield
     finally:
@@ -56,7 +80,7 @@ def _alone_at(file: Path, output: Path) -> Iterator[None]:
             os.close(lock)
 
 
-def _locked(path: Path, output: Path) -> int | None:
+def _locked(path: Path, output: Path, option: str) -> int | None:
     """Lock a file and return its descriptor; None if the file system has no locks."""
     try:
         import fcntl
@@ -70,7 +94,7 @@ def _locked(path: Path, output: Path) -> int | None:
         except OSError as error:
             os.close(lock)
             if error.errno in {errno.EACCES, errno.EAGAIN}:
-                raise _held(path, output) from None
+                raise _held(path, output, option) from None
             # these say that the file system has no locks
             if error.errno not in {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}:
                 raise
@@ -84,7 +108,7 @@ def _locked(path: Path, output: Path) -> int | None:
         os.close(lock)
 
 
-def _held(path: Path, output: Path) -> InvalidInputError:
+def _held(path: Path, output: Path, option: str) -> InvalidInputError:
     """Return the error about an output that another process writes."""
     who = ""
     with suppress(OSError, ValueError):
@@ -92,5 +116,5 @@ def _held(path: Path, output: Path) -> InvalidInputError:
     return InvalidInputError(
         f"{output}: another run{who} is writing there; wait until it has ended, or give another "
         "output",
-        field="-o",
+        field=option,
     )

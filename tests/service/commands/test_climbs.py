@@ -36,7 +36,7 @@ def written(tmp_path_factory) -> Path:
 
 
 def test_a_folder_has_all_of_a_climb(written):
-    names = {path.name for path in written.iterdir()} - {"route.json", ".route.lock"}
+    names = {path.name for path in written.iterdir()} - {"route.json"}
     pictures = {"margin.png", "climb.png", "support.png"}
     assert names - {"trajectory.parquet"} == pictures | {
         "stages.csv",

@@ -112,19 +112,26 @@ def commands(few: Path, rock: Path, folder: Path) -> dict[str, tuple[list[str], 
             ["batch", str(few), "-o", str(replies), "--resume"],
             folder / ".r.jsonl.lock",
         ),
-        "sweep": ([*sweep, "-o", str(out)], out / ".sweep.csv.lock"),
-        "route": (["route", "six-moves", "-o", str(out)], out / ".route.lock"),
+        "sweep": ([*sweep, "-o", str(out)], out / ".crux.lock"),
+        "route": (["route", "six-moves", "-o", str(out)], out / ".crux.lock"),
         "routes": (["route", "six-moves", "-o", str(replies)], folder / ".r.jsonl.lock"),
         "holds": (
             ["holds", str(rock), "-o", str(folder / "h.json"), *coarse, "--workers", "1"],
             folder / ".h.json.lock",
         ),
-        "study": (["study", "fig06", "-o", str(out)], out / ".result.json.lock"),
+        "rock": (
+            ["rock", str(rock), "-o", str(folder / "rock.ply")],
+            folder / ".rock.ply.lock",
+        ),
+        "demo": (["demo", "-o", str(folder / "d.png")], folder / ".d.png.lock"),
+        "demo, a climb": (["demo", "--climb", str(out)], out / ".crux.lock"),
+        "advice": (["plan", "wall-300", "--advice", str(out)], out / ".crux.lock"),
+        "study": (["study", "fig06", "-o", str(out)], out / ".crux.lock"),
     }
 
 
 NAMES = tuple(commands(Path(), Path(), Path()))
-LONG = ("route", "routes", "study")
+LONG = ("route", "routes", "demo", "demo, a climb", "advice", "study")
 
 
 @pytest.mark.parametrize("name", NAMES)
