@@ -35,7 +35,7 @@ from service.serving.settings import SERVING_SETTINGS
 from service.serving.shares import Shares
 from service.serving.waiting import Costs, Kind, Waiting
 from service.serving.worker_pool import WorkerPool
-from service.wire import Answer, CancelledError, LostError, ServiceName, decode_request
+from service.wire import Answer, CancelledError, Format, LostError, ServiceName, decode_request
 
 __all__ = ["Dispatcher"]
 
@@ -251,13 +251,14 @@ class Dispatcher:
     def _cancel(self, question: PendingQuestion) -> None:
         """Stop the questions of a client that have the id which it names."""
         try:
-            asked = decode_request(question.payload, CancelRequest, question.form)
+            form = Format.named(question.encoding)
+            asked = decode_request(question.payload, CancelRequest, form)
         except InvalidInputError as error:
             self._replies.refuse(question, error)
             return
         named, why = (question.place, asked.id), CancelledError("cancelled by its client")
         count = self._stop(lambda each: (each.place, each.id) == named, why, why.kind)
-        reply, form = CancelReply(id=asked.id, cancelled=count), question.form
+        reply = CancelReply(id=asked.id, cancelled=count)
         self._replies.reply(question, Answer(form.encode(reply), form.label(reply)))
 
     def _stop(self, which: Callable[[PendingQuestion], bool], error: CruxError, kind: str) -> int:

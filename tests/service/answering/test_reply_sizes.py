@@ -11,13 +11,14 @@ import pytest
 import zenoh
 from hypothesis import given, strategies as st
 
-from hand_models.base import CruxError, InvalidInputError
+from hand_models.base import CruxError, InvalidInputError, LimitError
 from service.answering import Streams, handle
+from service.answering.reply_sizes import fitted
 from service.bulk import evaluate
 from service.commands.options import with_extras
 from service.commands.stances import read_request
-from service.replies import ErrorReply
-from service.requests import LEAST_REPLY_BYTES, PlanRequest
+from service.replies import ClimbReply, ErrorReply
+from service.requests import LEAST_REPLY_BYTES, ClimbRequest, PlanRequest
 from service.serving.question import received_question
 from service.wire import LARGEST_ERROR, Answer, BusyError, Format, decode_request, encode_error
 from tests.suite.helpers.replies import PLAN
@@ -156,6 +157,50 @@ def test_of_a_wrench_space_views_may_be_left_out(want: list[str] | None, form: F
     answer = answered(fitting, form, "wrench_space")
     assert answer.good
     assert len(answer.payload) == least
+
+
+def test_how_a_hand_lets_go_may_be_left_out_of_a_wrench_space() -> None:
+    stance = wall_request()["stance"]
+    request = {"v": 1, "stance": stance, "limb": stance["hands"][0]["limb"], "want": ["opening"]}
+    _, _, others = error_of(
+        answered(request | {"max_reply_bytes": 4000}, Format.JSON, "wrench_space")
+    )
+    size = len(answered(request | {"want": []}, Format.JSON, "wrench_space").payload)
+    assert others == {"without opening in want": size}
+
+
+def searched(**more: Any) -> ClimbReply:
+    nothing = dict.fromkeys(("least", "bound", "gap", "deciding", "route", "knots"))
+    whole: dict[str, Any] = {
+        **{"name": "c", "robot": "r", "status": "none", "about": "a"},
+        **{"placements": 0, "bodies": 0, "programs": 0, "seconds": {}},
+        **{"raises": [], "refused": [], "stages": []},
+    }
+    return ClimbReply(**nothing, **(whole | more))
+
+
+def refusal_of(reply: ClimbReply) -> str:
+    """What is said of a reply to a search that has too many bytes."""
+    ends = {"start": {"height": 0.8}, "goal": {"height": 2.5}}
+    asked = {"v": 1, "rock": "small-wall", "max_reply_bytes": LEAST_REPLY_BYTES, **ends}
+    with pytest.raises(LimitError) as refused:
+        fitted(msgspec.convert(asked, ClimbRequest), reply, Format.JSON)
+    return refused.value.message
+
+
+def test_the_proof_of_a_climb_may_be_left_out() -> None:
+    size = len(Format.JSON.encode(searched()))
+    assert f"{size} without certificate in want" in refusal_of(searched(certificate=b"x" * 9000))
+
+
+def test_what_is_to_be_allowed_also_takes_times_of_more_digits() -> None:
+    short = {"index": 0.1, "search": 0.5, "moves": 2.0}
+    long = {"index": 0.10000000000000009, "search": 0.5000000000000009, "moves": 2.0000000000000004}
+    for letters in range(100):
+        name = "c" * (1000 + letters)
+        told = refusal_of(searched(id=name, seconds=short))
+        allowed = int(re.findall(r"allow (\d+)", told)[0])
+        assert len(Format.JSON.encode(searched(id=name, seconds=long))) <= allowed
 
 
 def test_of_a_body_space_directions_may_be_left_out() -> None:

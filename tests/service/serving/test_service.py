@@ -118,6 +118,15 @@ def test_an_error_comes_in_the_encoding_of_the_request(
     assert form.decode(answer.payload, ErrorReply).error.kind == "malformed"
 
 
+@pytest.mark.parametrize("key", [PLAN, ROUTE, SET_POINTS, CANCEL])
+def test_an_encoding_that_no_request_has_is_refused_at_every_key(
+    session: zenoh.Session, key: str
+) -> None:
+    (answer,) = ask(session, b'{"v": 1, "id": "x"}', "image/png", key)
+    assert not answer.good
+    assert msgspec.json.decode(answer.payload, type=ErrorReply).error.kind == "malformed"
+
+
 def test_a_query_without_payload_is_an_error(session: zenoh.Session) -> None:
     (answer,) = ask(session, None)
     assert not answer.good
