@@ -6,6 +6,7 @@ import threading
 import time
 import uuid
 from collections import Counter, OrderedDict
+from collections.abc import Set
 from typing import Final, NamedTuple
 
 from msgspec import UNSET
@@ -79,29 +80,39 @@ class Streams:
         Client that owns the streams which are declared through this object.
     among : Streams, optional
         Streams to share: the client can ask all of these, and owns only those that it declares.
+    connected : set of str, optional
+        Clients that are connected now; by default all are.
 
     Attributes
     ----------
     most : int
-        Maximum number of streams. When one more is declared, the client with most streams loses
-        the one of its streams that was used least recently.
+        Maximum number of streams. When one more is declared, a client that is no longer connected
+        loses one, or if there is none, the client with most streams: of these streams the one that
+        was used least recently.
     """
 
-    def __init__(self, owner: str = "", among: Streams | None = None) -> None:
+    def __init__(
+        self,
+        owner: str = "",
+        among: Streams | None = None,
+        connected: Set[str] | None = None,
+    ) -> None:
         self.most = 16
-        self._owner = owner
+        self._owner, self._connected = owner, connected
         self._lock: threading.Lock = threading.Lock() if among is None else among._lock
         self._kept: OrderedDict[str, _Kept] = OrderedDict() if among is None else among._kept
 
-    def of(self, owner: str) -> Streams:
+    def of(self, owner: str, connected: Set[str] | None = None) -> Streams:
         """Return a view of the same streams, through which a client declares streams as its own.
 
         Parameters
         ----------
         owner : str
             Identifier of the client.
+        connected : set of str, optional
+            Clients that are connected now; by default all are.
         """
-        return Streams(owner, self)
+        return Streams(owner, self, connected)
 
     def declare(self, request: StreamRequest, robots: Robots = BUNDLED_ROBOTS) -> StreamReply:
         """Build a stream, keep it under a new identifier, and plan its first body wrench.
@@ -162,11 +173,18 @@ class Streams:
         return reply
 
     def _taken_out(self) -> WrenchStream:
-        """Remove and return the oldest stream of the client that has most."""
+        """Remove and return the oldest stream of clients that have gone, or have most."""
         counts = Counter(each.owner for each in self._kept.values())
-        most = max(counts.values())
-        oldest = next(name for name, each in self._kept.items() if counts[each.owner] == most)
+        losing = {owner for owner in counts if not self._is_connected(owner)}
+        if not losing:
+            most = max(counts.values())
+            losing = {owner for owner, count in counts.items() if count == most}
+        oldest = next(name for name, each in self._kept.items() if each.owner in losing)
         return self._kept.pop(oldest).stream
+
+    def _is_connected(self, owner: str) -> bool:
+        """Return whether a client is connected, as far as is known: of nameless ones it is not."""
+        return not owner or self._connected is None or owner in self._connected
 
     def __len__(self) -> int:
         return len(self._kept)

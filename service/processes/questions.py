@@ -39,6 +39,8 @@ class Job(NamedTuple):
         Client that asks; each client owns the streams that it declares.
     stream : str or None
         Stream on which the payload was published as a wrench; None for queries.
+    connected : frozenset of str or None
+        Clients that are connected, for a query that declares a stream; None for others.
     """
 
     name: str
@@ -49,6 +51,7 @@ class Job(NamedTuple):
     rehearsal: bool = False
     client: str = ""
     stream: str | None = None
+    connected: frozenset[str] | None = None
 
 
 def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[[Job], Answer]:
@@ -86,7 +89,8 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
             os.nice(max(0, 10 - os.nice(0)))
         start, begun = time.perf_counter(), time.thread_time()
         arrived = start - job.waited
-        own = closing(Streams()) if job.rehearsal else nullcontext(streams.of(job.client))
+        kept = streams.of(job.client, job.connected)
+        own = closing(Streams()) if job.rehearsal else nullcontext(kept)
         with own as asked, deadline.within(job.seconds, started=arrived):
             found = handle(
                 job.name,

@@ -292,7 +292,10 @@ class Dispatcher:
         question.begun = time.perf_counter()
         self._pool.work[lane] = question
         rehearsal = question.name == ServiceName.STREAM and not question.rehearsed
-        lane.give(question.job(question.begun, rehearsal))
+        job = question.job(question.begun, rehearsal)
+        if question.name == ServiceName.STREAM:
+            job = job._replace(connected=self._names.connected())
+        lane.give(job)
 
     def _drop(self, client: str, token: bool) -> None:
         names = self._names

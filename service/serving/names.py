@@ -133,6 +133,10 @@ class ClientNames:
         """Return whether a digest of the session with an identifier is stored."""
         return name in self._proofs
 
+    def connected(self) -> frozenset[str]:
+        """Return the identifiers of all sessions that are linked, or have proven theirs."""
+        return frozenset(self.linked) | frozenset(self._proofs)
+
     def gone(self, name: str) -> None:
         """Forget the link and the digests of a session that has disconnected."""
         self.linked.discard(name)

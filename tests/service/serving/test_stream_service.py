@@ -210,6 +210,19 @@ def test_a_client_with_more_than_its_share_gives_room_to_others(
     assert [kept(known, name) for name in names] == [False] * half + [True] * half
 
 
+def test_streams_of_clients_that_have_gone_give_room_first(
+    known: Streams, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(streams, "opened", lambda *_: stand_in())
+    left = [known.of(f"gone {i}").declare(declaration()).stream for i in range(known.most - 1)]
+    (nameless,) = [known.of("").declare(declaration()).stream]
+    mine = [known.of("me", {"me"}).declare(declaration()).stream for _ in range(known.most - 1)]
+    assert not any(kept(known, name) for name in left)
+    assert all(kept(known, name) for name in [nameless, *mine])
+    known.of("other", {"me", "other"}).declare(declaration())
+    assert [kept(known, name) for name in mine] == [False] + [True] * (known.most - 2)
+
+
 def stand_in(close: Callable[[], None] = lambda: None) -> SimpleNamespace:
     """A stream that has nothing to say."""
     wrench = np.array(WRENCH)
