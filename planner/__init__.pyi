@@ -43,7 +43,9 @@ from .explanation import (
     constraint_words as constraint_words,
 )
 from .pages import (
+    PageTable as PageTable,
     write_climb_page as write_climb_page,
+    write_holds_page as write_holds_page,
     write_plan_page as write_plan_page,
     write_route_page as write_route_page,
 )

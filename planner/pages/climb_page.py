@@ -14,8 +14,7 @@ from hand_models.rock import Mesh
 from planner.climbs import FoundClimb
 from planner.pages.documents import write_document
 from planner.pages.route_page import shown_stages
-from planner.pages.scenes import Meshes
-from planner.pictures import PICTURE_SETTINGS, DrawnSurface, coarse
+from planner.pages.scenes import Meshes, rock_data, rock_stage
 from planner.programs import WRENCH_UNIT
 
 __all__ = ["write_climb_page"]
@@ -47,33 +46,34 @@ def write_climb_page(
         If plotly is not installed.
     """
     meshes, wall = Meshes(), found.wall
-    up, across, into = rock_pose.rotation.T
-    drawn = rock.triangles
-    if len(drawn.faces) > PICTURE_SETTINGS.wall_triangles:
-        extent = float(np.ptp(drawn.vertices, axis=0).max())
-        drawn = coarse(drawn, extent / PICTURE_SETTINGS.wall_cells)
-    surface = DrawnSurface("rock", "", rock_pose.apply(drawn.vertices), drawn.faces)
-    meshes.rock = meshes.of(surface, into)
+    meshes.rock, views = rock_data(rock.triangles, rock_pose, meshes)
     if found.result is None:
-        eyes = {"oblique": 0.6 * across - 0.8 * into, "facing the rock": -into}
-        views = {name: {"eye": eye.tolist(), "up": up.tolist()} for name, eye in eyes.items()}
-        empty: dict[str, Any] = {"lines": [], "dots": [], "arrows": [], "labels": [], "tiles": []}
-        scene = empty | {"surfaces": [meshes.rock], "views": views}
-        stages: list[dict[str, Any]] = [
-            {"name": "", "status": found.status, "sentence": "", "scene": scene}
-        ]
+        stages = [rock_stage(meshes.rock, views, status=found.status)]
     else:
         stages = shown_stages(found.result, meshes)
     lifts = wall.screening.hands.supports(np.eye(6)[2:3])[:, 0] * WRENCH_UNIT[2]
+    groups: list[dict[str, Any]] = [
+        {
+            "name": "placements",
+            "places": [each.pose.position.round(4).tolist() for each in wall.places],
+            "values": lifts.round(1).tolist(),
+            "label": "largest force upward [N]",
+            "template": "placement %{pointNumber}<br>carries %{marker.color:.0f} N upward at most",
+        },
+        {
+            "name": "poses of the body",
+            "places": [each.position.round(4).tolist() for each in wall.bodies],
+        },
+    ]
     bounded = math.isfinite(found.bound)
-    shown = {
-        "places": [each.pose.position.round(4).tolist() for each in wall.places],
-        "carried": lifts.round(1).tolist(),
-        "bodies": [each.position.round(4).tolist() for each in wall.bodies],
+    data = {
+        "stages": stages,
+        "meshes": meshes.packed,
+        "groups": groups,
+        "margin": "load factor",
         "bound": found.bound if bounded else None,
-        "said": list(said),
+        "said": [*said, *meshes.said],
     }
-    data = {"stages": stages, "meshes": meshes.packed, "wall": shown}
     if found.deciding is not None:
         data["crux"] = found.deciding.stage
     write_document(title, data, path)

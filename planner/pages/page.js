@@ -1,13 +1,16 @@
 "use strict";
 const byId = (name) => document.getElementById(name);
 const data = JSON.parse(byId("data").textContent);
-const shownKinds = { rock: true, robot: true, "forces of hands": true, "forces of tiles": false };
-if (data.wall) shownKinds.placements = true;
-let at = data.crux ?? 0, order = {};
+const hasRobot = data.stages.some((stage) => stage.scene?.arrows.length);
+const shownKinds = { rock: true, ...(hasRobot ? { robot: true, "forces of hands": true, "forces of tiles": false } : {}) };
+for (const group of data.groups ?? []) shownKinds[group.name] = true;
+let at = data.crux ?? 0, order = {}, drawnAdvice = null, ranges;
 
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 const made = (tag, text, kind) => Object.assign(document.createElement(tag), { textContent: text ?? "", className: kind ?? "" });
 const words = (name) => name.replaceAll("_", " ");
+const plain = (text) => words(text).replaceAll("&", "&amp;").replaceAll("<", "&lt;"); // plotly reads tags
+const fixed = (value, digits) => Number.isFinite(value) ? value.toFixed(digits) : "–";
 
 function bytesOf(text) { return Uint8Array.from(atob(text), (c) => c.charCodeAt(0)); }
 const unpacked = new Map();
@@ -28,14 +31,19 @@ function colourOf(used) { // as the still pictures have it: straight lines betwe
 
 // The scene ----------------------------------------------------------------------------------
 
+function* placed({ pose }, corners) { // in W
+  for (let n = 0; n < corners.length; n += 3) {
+    const [x, y, z] = corners.subarray(n, n + 3);
+    yield pose ? [0, 4, 8].map((k) => pose[k] * x + pose[k + 1] * y + pose[k + 2] * z + pose[k + 3]) : [x, y, z];
+  }
+}
+
 function meshOf(surfaces, more) { // many surfaces as one mesh, its text at each corner
   const mesh = { type: "mesh3d", x: [], y: [], z: [], i: [], j: [], k: [], hoverinfo: "skip", ...more };
   for (const surface of surfaces) {
     const first = mesh.x.length;
     const corners = numbers(surface.corners, Float32Array), triangles = numbers(surface.triangles, Uint32Array);
-    for (let n = 0; n < corners.length; n += 3) {
-      mesh.x.push(corners[n]); mesh.y.push(corners[n + 1]); mesh.z.push(corners[n + 2]);
-    }
+    for (const [x, y, z] of placed(surface, corners)) { mesh.x.push(x); mesh.y.push(y); mesh.z.push(z); }
     for (let n = 0; n < triangles.length; n += 3) {
       mesh.i.push(first + triangles[n]); mesh.j.push(first + triangles[n + 1]); mesh.k.push(first + triangles[n + 2]);
     }
@@ -60,9 +68,9 @@ function dotsOf(points, more) {
 function tilesOf(tiles, visible) {
   const corners = tiles.flatMap((t) => t.corners), [x, y, z] = [0, 1, 2].map((k) => corners.map((c) => c[k]));
   const of = (a) => tiles.flatMap((_, n) => a.map((corner) => 4 * n + corner));
-  const colours = tiles.map((t) => colourOf(t.used));
-  const text = tiles.map((t) => `${words(t.limb)}, ${words(t.finger)}, ${t.phalanx}<br>utilisation ${t.used.toFixed(2)}<br>`
-    + `shear ${t.shear.toFixed(1)} N, normal ${t.normal.toFixed(1)} N, lateral ${t.lateral.toFixed(1)} N`);
+  const colours = tiles.map((t) => colourOf(t.used ?? Infinity));
+  const text = tiles.map((t) => `${plain(t.limb)}, ${plain(t.finger)}, ${plain(t.phalanx)}<br>utilisation ${fixed(t.used, 2)}<br>`
+    + `shear ${fixed(t.shear, 1)} N, normal ${fixed(t.normal, 1)} N, lateral ${fixed(t.lateral, 1)} N`);
   return [
     { type: "mesh3d", x, y, z, i: of([0, 0]), j: of([1, 2]), k: of([2, 3]), hoverinfo: "skip",
       facecolor: colours.flatMap((c) => [c, c]), lighting: { ambient: 1, diffuse: 0 }, meta: "tiles" },
@@ -73,34 +81,46 @@ function tilesOf(tiles, visible) {
   ];
 }
 
-function arrowsOf(arrows, visible) {
-  const more = { meta: "forces of hands", visible };
-  return arrows.flatMap((arrow) => {
-    const colour = colourOf(arrow.used), step = arrow.tip.map((t, k) => t - arrow.start[k]);
-    const size = Math.hypot(...step) || 1, head = Math.min(0.06, size), [u, v, w] = step.map((s) => s / size);
-    const text = `${arrow.text.replaceAll("\n", "<br>")}<br>[${arrow.force.map((f) => f.toFixed(0)).join(", ")}] N in W`
-      + (arrow.used === null ? "" : `<br>utilisation of the hand ${arrow.used.toFixed(2)}`);
-    const ends = arrow.tip.map((t, k) => [t, [u, v, w][k]]);
-    return [
-      linesOf([[arrow.start, arrow.tip]], { ...more, line: { width: 7, color: colour } }),
-      { type: "cone", ...Object.fromEntries(["x", "y", "z"].map((c, k) => [c, [ends[k][0]]])), u: [u], v: [v], w: [w], ...more,
-        anchor: "tip", sizemode: "raw", sizeref: head, showscale: false, hoverinfo: "skip",
-        colorscale: [[0, colour], [1, colour]] },
-      dotsOf([arrow.tip], { ...more, mode: "markers+text", text: [arrow.text.split("\n")[0]], hovertext: [text],
-        hovertemplate: "%{hovertext}<extra></extra>", marker: { size: 5, color: colour },
-        textposition: "top center", textfont: { color: ink("ink"), size: 12 } }),
-    ];
+function arrowsOf(arrows, visible) { // their heads are pyramids of one mesh
+  const more = { meta: "forces of hands", visible }, colours = arrows.map((arrow) => colourOf(arrow.used)), sides = [0, 1, 2, 3, 4, 5];
+  const corners = arrows.flatMap(({ start, tip }) => {
+    const step = tip.map((t, k) => t - start[k]), size = Math.hypot(...step) || 1, head = Math.min(0.06, size), [x, y, z] = step.map((c) => c / size);
+    const aside = Math.abs(z) > 0.9 ? [0, z, -y] : [y, -x, 0], width = Math.hypot(...aside) || 1, u = aside.map((c) => c / width);
+    const v = [y * u[2] - z * u[1], z * u[0] - x * u[2], x * u[1] - y * u[0]];
+    return [tip, ...sides.map((n) => tip.map((t, k) => t - head * ([x, y, z][k] - 0.35 * (Math.cos(n * Math.PI / 3) * u[k] + Math.sin(n * Math.PI / 3) * v[k]))))];
   });
+  const [x, y, z] = [0, 1, 2].map((k) => corners.map((c) => c[k])), of = (step) => arrows.flatMap((_, n) => sides.map((side) => 7 * n + step(side)));
+  const hovertext = arrows.map((a) => `${plain(a.text).replaceAll("\n", "<br>")}<br>[${a.force.map((f) => fixed(f, 0)).join(", ")}] N in W`
+    + (a.kind === "load" ? "" : `<br>utilisation of the hand ${fixed(a.used, 2)}`));
+  return [
+    linesOf(arrows.map((a) => [a.start, a.tip]), { ...more, line: { width: 7, color: colours.flatMap((c) => [c, c, c]) } }),
+    { type: "mesh3d", x, y, z, i: of(() => 0), j: of((n) => n + 1), k: of((n) => (n + 1) % 6 + 1), hoverinfo: "skip", ...more,
+      facecolor: colours.flatMap((c) => sides.map(() => c)), lighting: { ambient: 0.9 } },
+    dotsOf(arrows.map((a) => a.tip), { ...more, hovertext, hovertemplate: "%{hovertext}<extra></extra>", marker: { size: 5, color: colours } }),
+  ];
 }
 
-function wallTraces(wall) { // what a search for a climb chose from
-  const more = { meta: "placements", visible: shownKinds.placements };
+function groupTraces() { // places that were tried: coloured by a value, or all alike
+  const symbols = ["circle-open", "diamond-open", "square-open", "diamond", "square", "circle"]; // others lack in many fonts
+  const colorbar = (text) => ({ title: { text, side: "top", font: { color: ink("dim") } }, orientation: "h", y: 0, yanchor: "bottom",
+    thickness: 8, len: 0.6, tickfont: { color: ink("dim") } });
+  return (data.groups ?? []).map((g, n) => dotsOf(g.places, { meta: g.name, visible: shownKinds[g.name], text: g.texts?.map((t) => plain(t).replaceAll("\n", "<br>")),
+    hoverinfo: g.texts || g.template ? "all" : "skip", hovertemplate: (g.texts || g.template) && `${g.template ?? "%{text}"}<extra></extra>`,
+    marker: g.values ? { size: 6, color: g.values, cmin: Math.min(0, ...g.values), cmax: Math.max(...g.values) || 1, colorscale: "Viridis", showscale: true, colorbar: colorbar(g.label) }
+      : { size: 3.5, symbol: symbols[n % 6], color: ink(["dim", "finger", "link"][n % 3]) } }));
+}
+
+const chosen = () => data.stages[at].advice?.[drawnAdvice];
+const middle = (points) => [0, 1, 2].map((k) => points.reduce((sum, p) => sum + p[k], 0) / points.length);
+function adviceTraces() { // palms and limbs after the change, and the ways there
+  if (!chosen()?.moves) return [];
+  const { moves, limbs } = chosen(), ring = (points) => [...points, points[0]], of = (end) => moves.flatMap((m) => m[end] ? [ring(m[end])] : []);
+  const both = moves.filter((m) => m.from && m.to), more = { meta: "advice" };
   return [
-    dotsOf(wall.places, { ...more, text: wall.carried.map((f, n) => `placement ${n}<br>carries ${f.toFixed(0)} N upward at most`),
-      hovertemplate: "%{text}<extra></extra>", marker: { size: 5, color: wall.carried, colorscale: "Viridis", showscale: true,
-        colorbar: { title: { text: "largest force upward [N]", side: "top", font: { color: ink("dim") } }, orientation: "h", y: 0,
-          yanchor: "bottom", thickness: 8, len: 0.5, tickfont: { color: ink("dim") } } } }),
-    dotsOf(wall.bodies, { ...more, marker: { size: 3, symbol: "cross", color: ink("dim") } }),
+    linesOf(of("from"), { ...more, line: { width: 4, color: ink("dim") } }), linesOf(of("to"), { ...more, line: { width: 6, color: ink("advice") } }),
+    linesOf(both.map((m) => [middle(m.from), middle(m.to)]), { ...more, line: { width: 6, color: ink("advice") } }),
+    linesOf(limbs, { ...more, line: { width: 3, color: ink("advice"), dash: "dash" } }),
+    dotsOf(moves.filter((m) => m.to).map((m) => middle(m.to)), { ...more, marker: { size: 6, color: ink("advice") } }),
   ];
 }
 
@@ -113,6 +133,7 @@ function sceneTraces(scene) {
     meshOf(of("rock"), { meta: "rock", visible: shownKinds.rock, color: ink("rock"), opacity: 0.6, lighting, ...flat }),
     meshOf(of("palm"), { color: ink("palm"), lighting: { ambient: 0.8 }, meta: "palms" }),
     meshOf(of("body"), { ...robot, color: ink("body"), opacity: 0.5, lighting }),
+    meshOf(of("mesh"), { ...robot, color: ink("body"), lighting }),
     meshOf(of("link"), { ...robot, color: ink("link"), opacity: 0.35, lighting }),
     linesOf(scene.lines.filter((l) => l.kind === "limb").map((l) => l.points), { ...robot, line: { width: 6, color: ink("limb") } }),
     linesOf(scene.lines.filter((l) => l.kind === "finger").map((l) => l.points), { line: { width: 4, color: ink("finger") } }),
@@ -120,43 +141,46 @@ function sceneTraces(scene) {
       text: joints.flatMap((d) => d.points.map((_, n) => `joint ${n + 1}` + (d.used ? `: utilisation ${d.used[n].toFixed(2)}` : ""))),
       marker: { size: 4, color: joints.flatMap((d) => d.points.map((_, n) => d.used ? colourOf(d.used[n]) : ink("back"))),
         line: { color: ink("limb"), width: 1 } } }),
-    dotsOf(scene.labels.map((l) => l.place), { mode: "text", text: scene.labels.map((l) => l.text), textposition: "bottom center",
-      textfont: { color: ink("ink"), size: 13 } }),
     dotsOf(points("load"), { marker: { size: 6, color: ink("load") } }),
-    ...(data.wall ? wallTraces(data.wall) : []),
+    ...groupTraces(), ...adviceTraces(),
     ...tilesOf(scene.tiles, shownKinds["forces of tiles"]),
     ...arrowsOf(scene.arrows, shownKinds["forces of hands"]),
   ];
 }
 
-const config = { displaylogo: false, responsive: true, displayModeBar: false };
+const config = { displaylogo: false, responsive: true, displayModeBar: false, plotGlPixelRatio: devicePixelRatio };
 const axis = (title) => ({ title: { text: title }, color: ink("dim"), gridcolor: ink("line"), zerolinecolor: ink("line"),
   backgroundcolor: ink("back"), showspikes: false });
 const vector = (v, length) => Object.fromEntries(["x", "y", "z"].map((c, k) => [c, length * v[k]]));
-function cameraOf(view) { // farther away in a narrow window
-  const { clientWidth, clientHeight } = byId("scene"), far = 1.7 * Math.max(1, 1.1 * clientHeight / clientWidth);
+function cameraOf(view) { // farther away in a narrow window, and from what is flat
+  const { clientWidth, clientHeight } = byId("scene"), sizes = ranges.map(([low, high]) => high - low);
+  const flat = Math.max(...sizes) / Math.cbrt(sizes[0] * sizes[1] * sizes[2]), far = 1.4 * Math.max(1.2, flat) * Math.max(1, 1.1 * clientHeight / clientWidth);
   return { eye: vector(view.eye, far), up: vector(view.up, 1), center: vector([0, 0, 0], 0) };
 }
 
 function bounds() { // of all stages, so that the view stays still
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-  const add = (p) => p.forEach((v, k) => { low[k] = Math.min(low[k], v); high[k] = Math.max(high[k], v); });
-  for (const { scene } of data.stages) {
-    if (!scene) continue;
-    for (const surface of scene.surfaces) {
-      const corners = numbers(surface.corners, Float32Array);
-      for (let n = 0; n < corners.length; n += 3) add([corners[n], corners[n + 1], corners[n + 2]]);
-    }
-    scene.arrows.forEach((arrow) => add(arrow.tip));
+  const add = (p) => p.forEach((v, k) => { if (Number.isFinite(v)) { low[k] = Math.min(low[k], v); high[k] = Math.max(high[k], v); } });
+  for (const { scene, advice } of data.stages) {
+    for (const surface of scene?.surfaces ?? []) for (const corner of placed(surface, numbers(surface.corners, Float32Array))) add(corner);
+    scene?.arrows.forEach((arrow) => add(arrow.tip));
+    advice?.forEach((a) => a.moves?.forEach((m) => m.to?.forEach(add)));
   }
-  return [0, 1, 2].map((k) => [low[k] - 0.05, high[k] + 0.05]);
+  return [0, 1, 2].map((k) => low[k] > high[k] ? [-1, 1] : [low[k] - 0.05, high[k] + 0.05]);
 }
 
-function drawScene(ranges, view) {
+function annotationsOf(scene) { // texts over the scene: as meshes they take a second
+  const said = (p, text, more) => ({ x: p[0], y: p[1], z: p[2], text: plain(text), showarrow: false, font: { color: ink("ink"), size: 12 }, ...more });
+  const arrows = shownKinds["forces of hands"] ? scene.arrows : [];
+  return [...scene.labels.map((l) => said(l.place, l.text, { yshift: -14 })), ...arrows.map((a) => said(a.tip, a.text.split("\n")[0], { yshift: 12 })),
+    ...(chosen()?.moves ?? []).map((m) => said(middle(m.to ?? m.from), m.text, { yshift: 28, font: { color: ink("advice"), size: 13 }, bgcolor: ink("panel") }))];
+}
+
+function drawScene(view) {
   const scene = data.stages[at].scene;
-  const axes = Object.fromEntries(["x", "y", "z"].map((c, k) => [`${c}axis`, { ...axis(`${c} of W [m]`), range: ranges[k] }]));
+  const axes = Object.fromEntries(["x", "y", "z"].map((c, k) => [`${c}axis`, { ...axis(`${c} of ${data.frame ?? "W"} [m]`), range: ranges[k], nticks: 6 }]));
   const layout = { margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: ink("back"), showlegend: false, uirevision: "kept",
-    hoverlabel: { align: "left" }, scene: { ...axes, aspectmode: "data", dragmode: "orbit" } };
+    hoverlabel: { align: "left" }, scene: { ...axes, aspectmode: "data", dragmode: "orbit", annotations: scene ? annotationsOf(scene) : [] } };
   if (view) layout.scene.camera = cameraOf(view);
   return Plotly.react(byId("scene"), scene ? sceneTraces(scene) : [], layout, config);
 }
@@ -177,20 +201,20 @@ function drawSlices(slices) {
       x: [...corners, corners[0]].map((c) => c?.[0]), y: [...corners, corners[0]].map((c) => c?.[1]), ...more });
     const colour = ink("load"), traces = [outline(slice.whole, "any", { line: { color: colour, width: 1 }, opacity: 0.35 })];
     if (slice.held) traces.push(outline(slice.held, "used", { line: { color: colour, width: 2 }, opacity: 0.9 }));
-    traces.push({ type: "scatter", mode: "markers", x: [slice.used[0]], y: [slice.used[1]], text: [slice.utilisation.toFixed(2)],
-      marker: { size: 11, color: colourOf(slice.utilisation), line: { color: ink("ink"), width: 1.5 } },
+    traces.push({ type: "scatter", mode: "markers", x: [slice.used[0]], y: [slice.used[1]], text: [fixed(slice.utilisation, 2)],
+      marker: { size: 11, color: colourOf(slice.utilisation ?? Infinity), line: { color: ink("ink"), width: 1.5 } },
       hovertemplate: "F<sub>x</sub> %{x:.1f} N, F<sub>z</sub> %{y:.1f} N<br>utilisation %{text}<extra></extra>" });
-    Plotly.react(place.children[n], traces, flatLayout({ title: { text: words(slice.limb), font: { size: 14 } },
+    Plotly.react(place.children[n], traces, flatLayout({ title: { text: plain(slice.limb), font: { size: 14 } },
       xaxis: flatAxis("F<sub>x</sub> in H [N]"), yaxis: flatAxis("F<sub>z</sub> in H [N]") }), config);
   });
 }
 
 function drawMargin() {
-  const stages = data.stages, bound = data.wall?.bound ?? null;
-  const margins = stages.map((s) => ((data.wall ? s.load_factor : s.utilisation) ?? null) === null ? null : data.wall ? s.load_factor : s.limit - s.utilisation);
-  const names = stages.map((s, n) => `${n} · ${s.name}`), known = margins.filter((m) => m !== null);
+  const stages = data.stages, bound = data.bound ?? null, measure = data.margin ?? "margin";
+  const margins = stages.map((s) => data.margin ? s.load_factor ?? null : Number.isFinite(s.utilisation) ? s.limit - s.utilisation : null);
+  const names = stages.map((s, n) => `${n} · ${plain(s.name)}`), known = margins.filter((m) => m !== null);
   const low = Math.max(Math.min(0, ...known), -1);
-  const text = stages.map((s, n) => margins[n] === null ? s.status : `${data.wall ? "load factor" : "margin"} ${margins[n].toFixed(2)}, utilisation ${s.utilisation.toFixed(2)}`);
+  const text = stages.map((s, n) => margins[n] === null ? s.status : `${measure} ${fixed(margins[n], 2)}, utilisation ${fixed(s.utilisation, 2)}`);
   const bars = { type: "bar", x: stages.map((_, n) => n), y: margins.map((m) => m === null ? 0 : Math.max(m, low)), text: names, customdata: text,
     textposition: "none", hovertemplate: "%{text}<br>%{customdata}<extra></extra>",
     marker: { color: stages.map((s) => colourOf(s.utilisation ?? 2)), line: { color: ink("ink"), width: stages.map((_, n) => n === at ? 3 : 0) } } };
@@ -201,7 +225,7 @@ function drawMargin() {
     hovertemplate: "no climb has more in all stages: %{y:.3f}<extra></extra>" };
   const crux = { visible: data.crux !== undefined, x: data.crux, y: margins[data.crux] ?? 0, text: "crux", showarrow: true, arrowhead: 2, ax: 0, ay: -28, arrowcolor: ink("ink") };
   return Plotly.react(byId("margin"), bound === null ? [bars, none] : [bars, none, line], flatLayout({ margin: { l: 50, r: 10, t: 32, b: 40 }, annotations: [crux],
-    xaxis: { ...flatAxis("stage"), zeroline: false, dtick: stages.length > 25 ? 5 : 1 }, yaxis: flatAxis(data.wall ? "load factor [1]" : "margin [1]") }), config);
+    xaxis: { ...flatAxis("stage"), zeroline: false, dtick: stages.length > 25 ? 5 : 1 }, yaxis: flatAxis(`${measure} [1]`) }), config);
 }
 
 function written(value) {
@@ -213,8 +237,8 @@ function written(value) {
 function drawTable(table, place) {
   const columns = table.columns.split(",");
   const sorted = order[table.title], rows = [...table.rows];
-  const compare = (a, b) => typeof a === "number" && typeof b === "number" ? a - b : String(a ?? "").localeCompare(String(b ?? ""));
-  if (sorted) rows.sort((a, b) => sorted.sign * compare(a[sorted.column], b[sorted.column]));
+  const compare = (a, b) => (a === null) - (b === null) || sorted.sign * (typeof a === "number" ? a - b : String(a).localeCompare(String(b)));
+  if (sorted) rows.sort((a, b) => compare(a[sorted.column] ?? null, b[sorted.column] ?? null)); // what is not there is last
   const shown = made("table"), head = shown.createTHead().insertRow(), body = shown.createTBody();
   const isWord = columns.map((_, n) => table.rows.some((row) => typeof row[n] === "string"));
   columns.forEach((column, n) => {
@@ -224,7 +248,7 @@ function drawTable(table, place) {
       const first = isWord[n] ? 1 : -1;
       order[table.title] = { column: n, sign: sorted?.column === n ? -sorted.sign : first };
       drawTable(table, place);
-      place.querySelectorAll("th button")[n].focus();
+      place.querySelectorAll("th button")[n].focus({ preventScroll: true });
     };
     cell.append(button); head.append(cell);
   });
@@ -232,7 +256,7 @@ function drawTable(table, place) {
     const line = body.insertRow();
     row.forEach((value, n) => {
       const cell = Object.assign(line.insertCell(), { textContent: written(value), className: isWord[n] ? "words" : "" });
-      if (columns[n].endsWith("utilisation") && value !== null) { cell.className = "used"; cell.style.setProperty("--used", colourOf(value)); }
+      if (columns[n].includes("utilisation") && value !== null) { cell.className = "used"; cell.style.setProperty("--used", colourOf(value)); }
     });
   }
   place.replaceChildren(shown);
@@ -244,15 +268,31 @@ function listed(title, lines) {
   byId("notes").append(made("h2", title), list);
 }
 
+function listedAdvice(advice) {
+  listed("Advice: changes that were planned and verified", advice.map((a) => `${a.holds ? "holds" : "less overloaded"}, utilisation ${fixed(a.utilisation, 2)}: ${a.sentence} `));
+  const place = made("div", "", "table");
+  advice.forEach((a, n) => {
+    if (!a.moves) return;
+    const button = made("button", drawnAdvice === n ? "hide" : "draw");
+    button.setAttribute("aria-pressed", drawnAdvice === n);
+    button.onclick = async () => {
+      drawnAdvice = drawnAdvice === n ? null : n;
+      await show();
+      byId("notes").querySelectorAll("li button")[advice.slice(0, n).filter((b) => b.moves).length].focus({ preventScroll: true });
+    };
+    byId("notes").querySelectorAll("li")[n].append(button);
+  });
+  if (chosen()?.table) { drawTable(chosen().table, place); byId("notes").append(made("h2", chosen().table.title), place); }
+}
+
 function showWords(stage) {
-  const parts = (stage.utilisation ?? null) === null ? [] : [`utilisation ${stage.utilisation.toFixed(2)} of ${stage.limit}`];
-  if ((stage.load_factor ?? null) !== null) parts.push(`load factor ${stage.load_factor.toFixed(2)}`);
+  const parts = Number.isFinite(stage.utilisation) ? [`utilisation ${fixed(stage.utilisation, 2)} of ${stage.limit}`] : [];
+  if (Number.isFinite(stage.load_factor)) parts.push(`load factor ${fixed(stage.load_factor, 2)}`);
   else if (stage.load_factor_status === "unbounded") parts.push("load factor unbounded");
   byId("outcome").replaceChildren(made("span", stage.status, `status ${stage.status}`), parts.join(", "));
   byId("sentence").textContent = stage.sentence;
   byId("notes").replaceChildren();
-  if (stage.advice?.length) listed("Advice: changes that were planned and verified", stage.advice.map((a) =>
-    `${a.holds ? "holds" : "less overloaded"}, utilisation ${a.utilisation.toFixed(2)}: ${a.sentence}`));
+  if (stage.advice?.length) listedAdvice(stage.advice);
   else if (stage.advice) listed("Advice", ["no change that was tried helps"]);
   if (stage.warnings?.length) listed("Warnings", stage.warnings);
   byId("tables").replaceChildren(...(stage.tables ?? []).flatMap((table) => {
@@ -264,27 +304,29 @@ function showWords(stage) {
 
 // Together ---------------------------------------------------------------------------------------
 
-async function show(ranges, view) {
+async function show(view) {
   const stage = data.stages[at];
   showWords(stage);
+  await drawScene(view);
   if (data.stages.length > 1) {
     byId("stage").value = at;
-    byId("where").textContent = `stage ${at} of ${data.stages.length - 1}: ${stage.name}` + (at === data.crux ? ", the crux" : "");
+    byId("where").textContent = `stage ${at} of ${data.stages.length - 1}: ${words(stage.name)}` + (at === data.crux ? ", the crux" : "");
     await drawMargin();
   }
-  await drawScene(ranges, view);
   drawSlices(stage.slices ?? []);
   document.body.dataset.shown = at;
 }
 
 async function start() {
   byId("title").textContent = data.title;
-  byId("about").replaceChildren(...(data.wall?.said ?? []).flatMap((line) => [line, made("br")]));
+  byId("about").replaceChildren(...(data.said ?? []).flatMap((line) => [line, made("br")]));
   byId("colours").style.background = `linear-gradient(to right, ${data.colours.utilisation.join(",")})`;
+  byId("scale").hidden = !hasRobot;
   byId("over").style.background = data.colours.overload;
   const packed = new Blob([bytesOf(byId("plotly").textContent)]).stream().pipeThrough(new DecompressionStream("gzip"));
   document.head.append(made("script", await new Response(packed).text()));
-  const ranges = bounds(), views = data.stages.find((s) => s.scene)?.scene.views ?? {};
+  ranges = bounds();
+  const views = data.stages.find((s) => s.scene)?.scene.views ?? {};
   for (const [name, view] of Object.entries(views)) {
     const button = made("button", name);
     button.onclick = () => Plotly.relayout(byId("scene"), { "scene.camera": cameraOf(view) });
@@ -292,10 +334,10 @@ async function start() {
   }
   for (const name of Object.keys(shownKinds)) {
     const label = made("label", ` ${name}`), box = Object.assign(made("input"), { type: "checkbox", checked: shownKinds[name] });
-    box.onchange = () => { shownKinds[name] = box.checked; show(ranges); };
+    box.onchange = () => { shownKinds[name] = box.checked; show(); };
     label.prepend(box); byId("views").append(label);
   }
-  const go = (stage) => { at = Math.min(Math.max(stage, 0), data.stages.length - 1); return show(ranges); };
+  const go = (stage) => { at = Math.min(Math.max(stage, 0), data.stages.length - 1); drawnAdvice = null; return show(); };
   if (data.stages.length > 1) {
     byId("along").hidden = false;
     byId("stage").max = data.stages.length - 1;
@@ -303,9 +345,9 @@ async function start() {
     byId("before").onclick = () => go(at - 1);
     byId("after").onclick = () => go(at + 1);
   }
-  await show(ranges, Object.values(views)[0]);
+  await show(Object.values(views)[0]);
   if (data.stages.length > 1) byId("margin").on("plotly_click", (event) => go(event.points[0].x));
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show(ranges));
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show());
 }
 
 start().catch((error) => {

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from hand_models.base import CruxError
+from planner.pages.advice_data import advice_data
 from planner.pages.documents import write_document
 from planner.pages.plan_rows import plan_tables
 from planner.pages.scenes import Meshes, scene_data
@@ -37,7 +38,7 @@ def write_plan_page(plan: Plan, question: Question, path: Path, title: str) -> N
     """
     meshes = Meshes()
     shown = shown_plan(plan, question, meshes)
-    write_document(title, {"stages": [shown], "meshes": meshes.packed}, path)
+    write_document(title, {"stages": [shown], "meshes": meshes.packed, "said": meshes.said}, path)
 
 
 def shown_plan(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]:
@@ -64,12 +65,7 @@ def shown_plan(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]
         "slices": [_slice(hand) for hand in plan.hands or ()],
         "tables": [each._asdict() for each in plan_tables(plan, question)],
         "warnings": list(plan.warnings),
-        "advice": None
-        if plan.advice is None
-        else [
-            {"sentence": each.sentence, "utilisation": each.utilisation, "holds": each.holds}
-            for each in plan.advice
-        ],
+        "advice": advice_data(plan, question),
     }
 
 

@@ -31,7 +31,7 @@ def write_route_page(result: RouteResult, path: Path) -> None:
     """
     meshes = Meshes()
     stages = shown_stages(result, meshes)
-    data = {"stages": stages, "crux": result.crux, "meshes": meshes.packed}
+    data = {"stages": stages, "crux": result.crux, "meshes": meshes.packed, "said": meshes.said}
     write_document(result.route.name, data, path)
 
 

@@ -7,12 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from hand_models.base import Array, Indices
-from planner.pictures import WORLD_UP, DrawnSurface, drawn_scene, view_directions
+from hand_models.base import Array, Indices, InvalidInputError, Pose
+from hand_models.rock import Triangles
+from planner.pictures import (
+    PICTURE_SETTINGS,
+    WORLD_UP,
+    DrawnSurface,
+    coarse,
+    drawn_scene,
+    view_directions,
+)
 from planner.question import HandOnHold, Question
 from planner.result import HandPlan, Plan
+from planner.robots import ROOT_JOINT, LinkMesh, Robot, joint_poses, link_meshes
 
-__all__ = ["Meshes", "scene_data"]
+__all__ = ["Meshes", "rock_data", "rock_stage", "scene_data"]
 
 
 class Meshes:
@@ -25,12 +34,16 @@ class Meshes:
         triangles' corners as 32-bit integers.
     rock : dict of str to object, or None
         Surface of `of` that all scenes show in place of the rock of their own holds, if any.
+    said : list of str
+        Sentences about the page, such as how the robot is drawn.
     """
 
     def __init__(self) -> None:
         self.packed: list[str] = []
         self.rock: dict[str, Any] | None = None
+        self.said: list[str] = []
         self._known: dict[str, int] = {}
+        self._links: dict[Robot, list[tuple[LinkMesh, dict[str, Any]]]] = {}
 
     def index_of(self, numbers: Array | Indices) -> int:
         """Return the place among ``packed`` of corners, or of triangles, shape (n, 3)."""
@@ -59,6 +72,63 @@ class Meshes:
             "triangles": self.index_of(triangles),
         }
 
+    def links_of(self, robot: Robot) -> list[tuple[LinkMesh, dict[str, Any]]]:
+        """Return the meshes of a robot's links, each with its surface; none if none can be read.
+
+        Many triangles are drawn coarsely, which is then said, so that the page stays small.
+        """
+        if robot not in self._links:
+            try:
+                found = link_meshes(robot)
+            except InvalidInputError as error:
+                self.said.append(f"Capsules stand for the links, whose meshes lack: {error}")
+                found = []
+            drawn = {id(each.triangles): each.triangles for each in found}
+            cell, most = 0.0, PICTURE_SETTINGS.robot_triangles
+            while sum(len(each.faces) for each in drawn.values()) > most:
+                cell = 1.5 * cell or PICTURE_SETTINGS.link_cell
+                drawn = {key: coarse(each, cell) for key, each in drawn.items()}
+            if cell:
+                self.said.append(f"Links are drawn coarsely, to {1e3 * cell:.0f} mm.")
+            shown = (drawn[id(each.triangles)] for each in found)
+            surfaces = [self.of(DrawnSurface("mesh", "", *each), WORLD_UP) for each in shown]
+            self._links[robot] = list(zip(found, surfaces, strict=True))
+        return self._links[robot]
+
+
+def rock_data(
+    rock: Triangles, pose: Pose, meshes: Meshes
+) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    """Return the surface of a whole rock, coarsely if that has many triangles, and its views.
+
+    Parameters
+    ----------
+    rock : Triangles
+        Its frame has x up the rock and z into it.
+    pose : Pose
+        Of that frame in the frame of the page.
+    meshes : Meshes
+        Meshes of the page, to which the rock is added.
+    """
+    up, across, into = pose.rotation.T
+    if len(rock.faces) > PICTURE_SETTINGS.wall_triangles:
+        extent = float(np.ptp(rock.vertices, axis=0).max())
+        rock = coarse(rock, extent / PICTURE_SETTINGS.wall_cells)
+    surface = DrawnSurface("rock", "", pose.apply(rock.vertices), rock.faces)
+    eyes = {"oblique": 0.6 * across - 0.8 * into, "facing the rock": -into}
+    views = {name: {"eye": eye.tolist(), "up": up.tolist()} for name, eye in eyes.items()}
+    return meshes.of(surface, into), views
+
+
+def rock_stage(rock: dict[str, Any], views: dict[str, Any], **more: Any) -> dict[str, Any]:
+    """Return a stage of a page that has rock alone, with more of its fields."""
+    empty: dict[str, Any] = {"lines": [], "dots": [], "arrows": [], "labels": [], "tiles": []}
+    return {
+        "name": "",
+        "sentence": "",
+        "scene": empty | {"surfaces": [rock], "views": views},
+    } | more
+
 
 def scene_data(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]:
     """Return the scene of a plan, with its tiles, as plain data in W.
@@ -78,20 +148,29 @@ def scene_data(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]
         ``surfaces``, ``lines``, ``dots``, ``arrows`` and ``labels`` of the `DrawnScene`; ``tiles``
         of the plan; ``views``: unit vectors from the scene to the eye and upward, in W, by name.
     """
-    scene = drawn_scene(plan, question, fineness=5)
-    seen = view_directions(question.stance)
+    stance = question.stance
+    links = meshes.links_of(stance.robot)
+    scene = drawn_scene(plan, question, 5, {link.joint for link, _ in links})
+    seen = view_directions(stance)
     aside = np.cross(seen.ahead, WORLD_UP)
     eyes = {
         "oblique": -seen.into - 0.3 * seen.ahead * seen.steep + 0.6 * aside,
         "facing the rock": -seen.into,
         "from the side": aside,
     }
-    hands = {hand.limb: hand for hand in question.stance.hands}
+    hands = {hand.limb: hand for hand in stance.hands}
+    joints = joint_poses(stance.robot, plan.joints or {})
     surfaces = [
         meshes.of(each, hands[each.name].pose.rotation[:, 2] if each.name else seen.into)
         for each in scene.surfaces
         if len(each.faces) and (meshes.rock is None or each.kind != "rock")
     ]
+    for link, surface in links:
+        # where the joints are not known, only what none moves
+        if plan.joints is not None or link.joint == ROOT_JOINT:
+            pose = stance.body @ joints[link.joint] @ link.pose
+            moved = np.column_stack([pose.rotation, pose.position]).round(5)
+            surfaces.append(surface | {"pose": moved.ravel().tolist()})
     return {
         "surfaces": surfaces if meshes.rock is None else [*surfaces, meshes.rock],
         "lines": [{"kind": line.kind, "points": _places(line.points)} for line in scene.lines],

@@ -5,7 +5,7 @@ Each part has a kind, from which a renderer chooses the style. No renderer is im
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Final, NamedTuple
@@ -219,7 +219,9 @@ def view_directions(stance: Stance) -> ViewDirections:
     return ViewDirections(ahead, into, chosen == 0, bool(abs(into @ WORLD_UP) >= 0.9))
 
 
-def drawn_scene(plan: Plan, question: Question, fineness: int = 10) -> DrawnScene:
+def drawn_scene(
+    plan: Plan, question: Question, fineness: int = 10, without: Collection[int] = ()
+) -> DrawnScene:
     """Return all visible parts of a plan, in W.
 
     Parameters
@@ -230,10 +232,12 @@ def drawn_scene(plan: Plan, question: Question, fineness: int = 10) -> DrawnScen
         Question that the plan answers.
     fineness : int, optional
         Number of points in half the outline of a capsule's end.
+    without : collection of int, optional
+        Joints of Pinocchio's model that no capsule is drawn of.
     """
     stance = question.stance
     settled = [settle_hand(hand, stance) for hand in stance.hands]
-    surfaces = _body(plan, stance, fineness)
+    surfaces = _body(plan, stance, fineness, without)
     lines: list[Line] = []
     dots: list[Dots] = []
     for hand, known, rock in zip(stance.hands, settled, _rocks(stance.hands, settled), strict=True):
@@ -328,7 +332,9 @@ def _rocks(hands: Sequence[HandOnHold], settled: Sequence[SettledHand]) -> list[
     return rocks
 
 
-def _body(plan: Plan, stance: Stance, fineness: int) -> list[DrawnSurface]:
+def _body(
+    plan: Plan, stance: Stance, fineness: int, without: Collection[int]
+) -> list[DrawnSurface]:
     """Return the capsules of what no joint moves, and of links where the joints are known.
 
     Of a robot whose file has no capsules of its body, all triangles of B and the first joints.
@@ -342,9 +348,12 @@ def _body(plan: Plan, stance: Stance, fineness: int) -> list[DrawnSurface]:
     placed = stance.body.apply(ends.reshape(-1, 3)).reshape(-1, 2, 3)
     found = [
         DrawnSurface(kind, "", *_capsule(start, end, radius, fineness))
-        for kind, (start, end), radius in zip(kinds, placed, radii.tolist(), strict=True)
+        for kind, (start, end), radius, joint in zip(
+            kinds, placed, radii.tolist(), robot.capsules.joints[: len(kinds)], strict=True
+        )
+        if joint not in without
     ]
-    if "body" not in kinds:
+    if "body" not in kinds and not without:
         corners = [stance.body.position]
         if plan.joints is not None:
             chains = [robot.link_chain(plan.joints, limb) for limb in robot.limbs]

@@ -1,9 +1,15 @@
+from .build import ROOT_JOINT as ROOT_JOINT
 from .capsules import Capsules as Capsules, scene_number as scene_number
 from .inverse_kinematics import (
     UnreachableError as UnreachableError,
     solve_limbs as solve_limbs,
 )
 from .limb_batch import LimbBatch as LimbBatch
+from .link_meshes import (
+    LinkMesh as LinkMesh,
+    joint_poses as joint_poses,
+    link_meshes as link_meshes,
+)
 from .link_tree import LimbTorques as LimbTorques, LinkTree as LinkTree
 from .payload import (
     Payload as Payload,

@@ -18,7 +18,7 @@ from planner.robots.robot_file import Mount, RobotDescription
 from planner.robots.tolerances import TOLERANCES
 from planner.robots.urdf import JointElement, Urdf
 
-__all__ = ["Chain", "build_model", "pose_of"]
+__all__ = ["ROOT_JOINT", "Chain", "build_model", "pose_of"]
 
 ROOT_JOINT: Final = 1
 """Index of the joint that lets the whole robot move freely, in Pinocchio's model."""

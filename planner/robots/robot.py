@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,7 +32,7 @@ from planner.robots.capsules import capsules_of
 from planner.robots.robot_file import RobotDescription, RobotFile
 from planner.robots.urdf import parse_urdf
 
-__all__ = ["Robot", "Statics", "robosimian", "robot_of"]
+__all__ = ["Angles", "Robot", "Statics", "robosimian", "robot_of"]
 
 
 Angles = Mapping[str, Array] | Mapping[str, Sequence[float]]
@@ -69,10 +70,12 @@ class Robot:
         Text of the robot's URDF, without hands.
     hand : SpinyHand
         The hand on every limb.
+    folder : Path, optional
+        Folder of the URDF, from which it names its meshes.
 
     Attributes
     ----------
-    description, urdf, hand
+    description, urdf, hand, folder
         The parameters.
     name : str
         Name of the robot in its file.
@@ -107,8 +110,10 @@ class Robot:
         If the URDF is invalid, a link is not in it, or a limb is no chain of joints of its own.
     """
 
-    def __init__(self, description: RobotDescription, urdf: str, hand: SpinyHand) -> None:
-        self.description, self.urdf, self.hand = description, urdf, hand
+    def __init__(
+        self, description: RobotDescription, urdf: str, hand: SpinyHand, folder: Path = Path()
+    ) -> None:
+        self.description, self.urdf, self.hand, self.folder = description, urdf, hand, folder
         with errors_under("urdf"):
             self.tree = parse_urdf(urdf)
         self.model, self.root, self.chains, self.locked = build_model(
@@ -141,7 +146,7 @@ class Robot:
 
     def __reduce__(self) -> tuple[type[Robot], tuple[Any, ...]]:
         # Pinocchio's model and the thread's data stay behind: the other process builds its own
-        return Robot, (self.description, self.urdf, self.hand)
+        return Robot, (self.description, self.urdf, self.hand, self.folder)
 
     def stretches(self, body: Pose, limbs: Sequence[str], hands: Sequence[Pose]) -> list[float]:
         """Return the distance of each hand from its limb's shoulder as a share of the limb's reach.
@@ -386,4 +391,6 @@ def robot_of(file: RobotFile, hand_numbers: ParameterTable | None = None) -> Rob
     """
     hand = spiny_hand(hand_numbers)
     with in_file(file.origin):
-        return Robot(RobotDescription.read(file.toml), file.urdf, hand)
+        described = RobotDescription.read(file.toml)
+        folder = (Path(file.origin).parent / described.urdf).parent
+        return Robot(described, file.urdf, hand, folder)

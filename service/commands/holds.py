@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 import msgspec
@@ -23,13 +22,8 @@ if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
 
     Outcome = fixed_wrist.FoundHold | InvalidInputError
-    Pair = tuple[fixed_wrist.HoldTrial, fixed_wrist.FoundHold]
-    Point = tuple[float, float, float]
 
 __all__ = ["holds_command"]
-
-SHOWN_HOLDS: Final = 10
-"""Number of the best holds that are printed, and drawn."""
 
 
 @click.command("holds")
@@ -125,6 +119,7 @@ SHOWN_HOLDS: Final = 10
 @options.workers_options
 @options.hand_option
 @options.plot_option("Draw the rock there, and on it the largest pull-off at each point.")
+@options.page_option
 @options.json_option
 def holds_command(
     rock: Path,
@@ -143,6 +138,7 @@ def holds_command(
     parallel: options.WorkersOption,
     hand: ParameterTable | None,
     picture: Path | None,
+    page: Path | None,
     as_json: bool,
 ) -> int:
     """Propose holds on ROCK, a mesh in metres (of a scan, `crux rock` makes one).
@@ -252,13 +248,17 @@ def holds_command(
             raise CruxError(f"{broken.message}; {kept}")
         raise processes.Interrupted(kept)
     if picture is not None:
-        _draw(mesh, trials, outcomes, found, sort, direction, picture, rock.name)
+        with tables.writing(picture):
+            tables.draw_holds(mesh, trials, outcomes, found, result, picture)
+    if page is not None:
+        with tables.writing(page, "--html"):
+            tables.write_holds(mesh, trials, outcomes, found, result, page)
     if as_json:
         summary = {name: value for name, value in result.items() if name != "refusals"}
         tables.say({**summary, "holds": len(found), "file": str(output)})
     else:
         out = tables.console()
-        tables.print_holds(result, trials, found, SHOWN_HOLDS, out)
+        tables.print_holds(result, trials, found, out)
         out.print(f"{output} (in m, rad, N)", soft_wrap=True)
     return tables.ExitStatus.DONE if found else tables.ExitStatus.OVERLOADED
 
@@ -285,69 +285,3 @@ def _ranked(outcomes: Mapping[int, Outcome], by: fixed_wrist.HoldRank, direction
 
     tried = sorted(outcomes)
     return [tried[k] for k in ranked_holds([outcomes[i] for i in tried], by, direction)]
-
-
-def _draw(
-    mesh: Any,
-    trials: list[fixed_wrist.HoldTrial],
-    outcomes: Mapping[int, Outcome],
-    found: list[Pair],
-    by: fixed_wrist.HoldRank,
-    direction: str,
-    path: Path,
-    name: str,
-) -> None:
-    """Draw holds; nine in ten samples have a force where nine in ten hold, so shares are drawn."""
-    import numpy as np
-
-    from hand_models.fixed_wrist import TRIAL_WAYS
-    from hand_models.scans import plot_holds
-
-    k = list(TRIAL_WAYS).index(direction)
-    first: dict[Point, float] = {}
-    for trial, each in found:
-        share = math.nan if each.robust is None else 100.0 * each.robust.share[k]
-        values = {"pure": np.fmax(each.pure[k], 0.0), "support": each.support[k]}
-        first.setdefault(trial.point, float(values.get(by, share)))
-    labels = {
-        "pure": f"force along {direction} alone [N], 0 without any",
-        "support": f"largest force along {direction} [N]",
-    }
-    marks = _marks(trials, outcomes, first)
-    known = {point: value for point, value in first.items() if not math.isnan(value)}
-    with tables.writing(path):
-        plot_holds(
-            mesh.triangles,
-            np.array(list(known)).reshape(-1, 3),
-            np.array(list(known.values())),
-            {f"{words} ({len(at)})": np.array(at) for words, at in marks},
-            [each.pose for _, each in found[:SHOWN_HOLDS]],
-            path,
-            f"holds on {name}: the best hand at each point",
-            labels.get(by, f"samples that hold the force along {direction} alone [%]"),
-        )
-
-
-def _marks(
-    trials: list[fixed_wrist.HoldTrial],
-    outcomes: Mapping[int, Outcome],
-    values: Mapping[Point, float],
-) -> list[tuple[str, list[Point]]]:
-    """Return points without a value by what they are, in words; the kind with most points first.
-
-    A point without a hold has the kind of reason of most of its trials.
-    """
-    from hand_models.fixed_wrist import REFUSAL_WORDS
-
-    kinds: dict[Point, Counter[str]] = {}
-    for i, outcome in sorted(outcomes.items()):
-        if trials[i].point not in values:
-            kinds.setdefault(trials[i].point, Counter())[tables.refusal_kind(outcome)] += 1
-    marked: dict[str, list[Point]] = {}
-    for point, counts in kinds.items():
-        words = REFUSAL_WORDS[counts.most_common(1)[0][0]]
-        marked.setdefault(words, []).append(point)
-    unknown = [point for point, value in values.items() if math.isnan(value)]
-    if unknown:
-        marked["a hand holds something; no samples were tried"] = unknown
-    return sorted(marked.items(), key=lambda each: -len(each[1]))

@@ -289,9 +289,12 @@ def play_command(
     metavar="[DIR]",
     help="Search for a climb on the bundled knob-wall instead; where its files go.",
 )
+@options.page_option
 @options.own_options
 @options.json_option
-def demo_command(picture: Path, folder: Path | None, own: options.Own, as_json: bool) -> int:
+def demo_command(
+    picture: Path, folder: Path | None, page: Path | None, own: options.Own, as_json: bool
+) -> int:
     """Start the service, ask it for a plan of a real stance, and draw the answer.
 
     A robot of --robot whose limbs do not reach that stance's holds is planned for without joints.
@@ -301,8 +304,7 @@ def demo_command(picture: Path, folder: Path | None, own: options.Own, as_json: 
         from service.commands.routes import search_climb
 
         asked = own.asked(climbs.demo_request())
-        return search_climb(asked, folder, options.WorkersOption(None, None), own, as_json)
-    tables.write_alone(picture)
+        return search_climb(asked, folder, options.WorkersOption(None, None), own, as_json, page)
     request = options.with_extras(own.asked(stances.read_request("wall-300-joints")))
     serving.start_zenoh_log()
     config = serving.zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
@@ -321,7 +323,10 @@ def demo_command(picture: Path, folder: Path | None, own: options.Own, as_json: 
             stance = msgspec.structs.replace(request.stance, joints=None)
             request = msgspec.structs.replace(request, stance=stance)
             reply = client.plan(request)
-    tables.write_plan_picture(answering.planned(request, own.robots), picture)
+    answer = answering.planned(request, own.robots)
+    tables.write_plan_picture(answer, picture)
+    if page is not None:
+        tables.write_answer_page(answer, page, "wall-300-joints")
     status = tables.show(reply, as_json)
     if not as_json:
         tables.console().print(f"picture: {picture}")

@@ -25,10 +25,12 @@ from .hands import (
     survey_json as survey_json,
 )
 from .holds import (
+    draw_holds as draw_holds,
     hold_json as hold_json,
     print_holds as print_holds,
     refusal_kind as refusal_kind,
     refusals_json as refusals_json,
+    write_holds as write_holds,
 )
 from .layout import (
     VERBOSITY_KEY as VERBOSITY_KEY,

@@ -1,12 +1,14 @@
-"""Print holds that were found on rock, and convert them into JSON values."""
+"""Print and draw holds that were found on rock, and convert them into JSON values."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
 from rich.console import Console
 
 from hand_models.base import Array, InvalidInputError, RefusedPlaceError
@@ -22,9 +24,15 @@ from service.tables.layout import name, number, print_rows, print_warnings, text
 
 if TYPE_CHECKING:
     from hand_models.hand import Placing
+    from hand_models.rock import Mesh
 
-__all__ = ["hold_json", "print_holds", "refusal_kind", "refusals_json"]
+__all__ = ["draw_holds", "hold_json", "print_holds", "refusal_kind", "refusals_json", "write_holds"]
 
+SHOWN_HOLDS: Final = 10
+"""Number of the best holds that are printed, and drawn."""
+
+Point = tuple[float, float, float]
+Outcomes = Mapping[int, FoundHold | InvalidInputError]
 Pair = tuple[HoldTrial, FoundHold]
 
 
@@ -72,9 +80,7 @@ def _by_way(values: Array) -> dict[str, float | None]:
     }
 
 
-def refusals_json(
-    trials: Sequence[HoldTrial], outcomes: Mapping[int, FoundHold | InvalidInputError]
-) -> dict[str, Any]:
+def refusals_json(trials: Sequence[HoldTrial], outcomes: Outcomes) -> dict[str, Any]:
     """Return why a hand cannot be at the places that were refused, as JSON values.
 
     Parameters
@@ -90,8 +96,8 @@ def refusals_json(
         Number of ``refused`` trials, by kind (``kinds``), by reason (``reasons``), and by point
         with both (``refusals``).
     """
-    kinds: dict[tuple[float, float, float], Counter[str]] = {}
-    found: dict[tuple[float, float, float], Counter[str]] = {}
+    kinds: dict[Point, Counter[str]] = {}
+    found: dict[Point, Counter[str]] = {}
     for i, each in sorted(outcomes.items()):
         if isinstance(each, InvalidInputError):
             point = trials[i].point
@@ -126,7 +132,6 @@ def print_holds(
     result: Mapping[str, Any],
     trials: Sequence[HoldTrial],
     found: Sequence[Pair],
-    shown: int,
     out: Console,
 ) -> None:
     """Print the best holds, and why a hand cannot be at other places.
@@ -139,8 +144,6 @@ def print_holds(
         Places and grasps that were tried.
     found : sequence of (HoldTrial, FoundHold)
         Holds, the best first.
-    shown : int
-        Number of holds that are printed.
     out : Console
         Console to print on.
     """
@@ -172,7 +175,7 @@ def print_holds(
         f"sorted by {words[by]}",
         "cannot: directions in H, of pull-off and shear, without any force alone",
     )
-    print_rows(found[:shown], columns, out, legend=legend)
+    print_rows(found[:SHOWN_HOLDS], columns, out, legend=legend)
     least = FORCE_TOLERANCE
     alone = sum(each.pure[k] >= least for _, each in found)
     points = len({trial.point for trial in trials})
@@ -211,3 +214,145 @@ def _ways(ways: Iterable[str]) -> str:
 
 def _finite(value: float) -> str:
     return f"{value:z.1f}" if math.isfinite(value) else "-"
+
+
+def draw_holds(
+    mesh: Mesh,
+    trials: Sequence[HoldTrial],
+    outcomes: Outcomes,
+    found: Sequence[Pair],
+    result: Mapping[str, Any],
+    path: Path,
+) -> None:
+    """Draw the best hold at each point, and points without one; parameters as `write_holds`."""
+    from hand_models.scans import plot_holds
+
+    label, first = _values(found, result)
+    marks = _marks(trials, outcomes, {point: value for point, (_, value) in first.items()})
+    known = {point: value for point, (_, value) in first.items() if not math.isnan(value)}
+    plot_holds(
+        mesh.triangles,
+        np.array(list(known)).reshape(-1, 3),
+        np.array(list(known.values())),
+        {f"{words} ({len(at)})": np.array(at) for words, at in marks},
+        [each.pose for _, each in found[:SHOWN_HOLDS]],
+        path,
+        f"holds on {Path(result['rock']).name}: the best hand at each point",
+        label,
+    )
+
+
+def write_holds(
+    mesh: Mesh,
+    trials: Sequence[HoldTrial],
+    outcomes: Outcomes,
+    found: Sequence[Pair],
+    result: Mapping[str, Any],
+    path: Path,
+) -> None:
+    """Write a page with the best hold at each point, and why there is none at others.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The rock.
+    trials : sequence of HoldTrial
+        Places and grasps that were tried.
+    outcomes : mapping of int to FoundHold or InvalidInputError
+        Outcome of each trial, by its index.
+    found : sequence of (HoldTrial, FoundHold)
+        Holds, the best first.
+    result : mapping
+        Content of the file of the holds, as in `print_holds`.
+    path : Path
+        File to write.
+    """
+    import planner
+
+    way, degree, most = result["direction"], 180.0 / math.pi, 500  # rows of the table
+    label, first = _values(found, result)
+    columns = "hold,x [m],y [m],z [m],wrist [°],outer fingers [°]"
+    columns += f",{way} alone [N],{way} with others [N],{way} alone in 9 of 10 [N],share [%]"
+    rows: list[list[Any]] = []
+    for i, hold in enumerate(result["holds"][:most], 1):
+        turns = hold["place"]["wrist_angle"], hold["grasp"]["outer_rotation"]
+        row = [i, *hold["place"]["point"], *(degree * turn for turn in turns)]
+        row += [hold["pure"][way], hold["support"][way]]
+        tenth, share = hold["pure_tenth"], hold["share"]
+        row += [tenth and tenth[way], None if share is None else 100.0 * share[way]]
+        rows.append(row)
+    reasons = {tuple(each["point"]): each["reasons"] for each in result["refusals"]}
+    marks = _marks(trials, outcomes, {point: value for point, (_, value) in first.items()})
+    refused = {
+        words: [
+            (at, "\n".join([words, *(f"{n} × {why}" for why, n in reasons.get(at, {}).items())]))
+            for at in places
+        ]
+        for words, places in marks
+    }
+    holds = [
+        (
+            point,
+            value,
+            f"hold {i + 1}\n{label}: {value:.1f}\nwrist {degree * found[i][0].wrist_angle:.0f}°, "
+            f"outer fingers {degree * found[i][0].outer_rotation:.0f}°",
+        )
+        for point, (i, value) in first.items()
+        if not math.isnan(value)
+    ]
+    name = Path(result["rock"]).name
+    said = [
+        f"{result['tried']:,} hands were tried, {result['refused']:,} of them cannot be where they "
+        f"were tried, {len(found):,} hold something.",
+        "A point has the colour of its best hand.",
+        *result["warnings"],
+    ]
+    title = f"The best {most} holds" if len(found) > most else "Holds"
+    table = planner.PageTable(title, columns, rows)
+    planner.write_holds_page(
+        mesh.triangles, holds, refused, label, table, path, f"holds on {name}", said
+    )
+
+
+def _values(
+    found: Sequence[Pair], result: Mapping[str, Any]
+) -> tuple[str, dict[Point, tuple[int, float]]]:
+    """Return what is drawn of holds, in words, and each point's best hold with its value.
+
+    Nine in ten samples have a force where nine in ten hold, so shares are drawn.
+    """
+    way = result["direction"]
+    k, first = list(TRIAL_WAYS).index(way), dict[Point, tuple[int, float]]()
+    for i, (trial, each) in enumerate(found):
+        share = math.nan if each.robust is None else 100.0 * each.robust.share[k]
+        values = {"pure": np.fmax(each.pure[k], 0.0), "support": each.support[k]}
+        first.setdefault(trial.point, (i, float(values.get(result["sort"], share))))
+    labels = {
+        "pure": f"force along {way} alone [N], 0 without any",
+        "support": f"largest force along {way} [N]",
+    }
+    words = f"samples that hold the force along {way} alone [%]"
+    return labels.get(result["sort"], words), first
+
+
+def _marks(
+    trials: Sequence[HoldTrial],
+    outcomes: Outcomes,
+    values: Mapping[Point, float],
+) -> list[tuple[str, list[Point]]]:
+    """Return points without a value by what they are, in words; the kind with most points first.
+
+    A point without a hold has the kind of reason of most of its trials.
+    """
+    kinds: dict[Point, Counter[str]] = {}
+    for i, outcome in sorted(outcomes.items()):
+        if trials[i].point not in values:
+            kinds.setdefault(trials[i].point, Counter())[refusal_kind(outcome)] += 1
+    marked: dict[str, list[Point]] = {}
+    for point, counts in kinds.items():
+        words = REFUSAL_WORDS[counts.most_common(1)[0][0]]
+        marked.setdefault(words, []).append(point)
+    unknown = [point for point, value in values.items() if math.isnan(value)]
+    if unknown:
+        marked["a hand holds something; no samples were tried"] = unknown
+    return sorted(marked.items(), key=lambda each: -len(each[1]))
