@@ -154,7 +154,7 @@ const axis = (title) => ({ title: { text: title }, color: ink("dim"), gridcolor:
 const vector = (v, length) => Object.fromEntries(["x", "y", "z"].map((c, k) => [c, length * v[k]]));
 function cameraOf(view) { // farther away in a narrow window, and from what is flat
   const { clientWidth, clientHeight } = byId("scene"), sizes = ranges.map(([low, high]) => high - low);
-  const flat = Math.max(...sizes) / Math.cbrt(sizes[0] * sizes[1] * sizes[2]), far = 1.4 * Math.max(1.2, flat) * Math.max(1, 1.1 * clientHeight / clientWidth);
+  const flat = Math.max(...sizes) / Math.cbrt(sizes[0] * sizes[1] * sizes[2]), far = 1.5 * Math.max(1.2, flat) * Math.max(1, 1.1 * clientHeight / clientWidth);
   return { eye: vector(view.eye, far), up: vector(view.up, 1), center: vector([0, 0, 0], 0) };
 }
 
@@ -170,7 +170,8 @@ function bounds() { // of all stages, so that the view stays still
 }
 
 function annotationsOf(scene) { // texts over the scene: as meshes they take a second
-  const said = (p, text, more) => ({ x: p[0], y: p[1], z: p[2], text: plain(text), showarrow: false, font: { color: ink("ink"), size: 12 }, ...more });
+  const short = (text) => text.length > 30 ? `${text.slice(0, 29)}…` : text;
+  const said = (p, text, more) => ({ x: p[0], y: p[1], z: p[2], text: plain(short(text)), showarrow: false, font: { color: ink("ink"), size: 12 }, ...more });
   const arrows = shownKinds["forces of hands"] ? scene.arrows : [];
   return [...scene.labels.map((l) => said(l.place, l.text, { yshift: -14 })), ...arrows.map((a) => said(a.tip, a.text.split("\n")[0], { yshift: 12 })),
     ...(chosen()?.moves ?? []).map((m) => said(middle(m.to ?? m.from), m.text, { yshift: 28, font: { color: ink("advice"), size: 13 }, bgcolor: ink("panel") }))];
@@ -178,7 +179,7 @@ function annotationsOf(scene) { // texts over the scene: as meshes they take a s
 
 function drawScene(view) {
   const scene = data.stages[at].scene;
-  const axes = Object.fromEntries(["x", "y", "z"].map((c, k) => [`${c}axis`, { ...axis(`${c} of ${data.frame ?? "W"} [m]`), range: ranges[k], nticks: 6 }]));
+  const axes = Object.fromEntries(["x", "y", "z"].map((c, k) => [`${c}axis`, { ...axis(`${c} of ${data.frame ?? "W"} [m]`), range: ranges[k], nticks: 4 }]));
   const layout = { margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: ink("back"), showlegend: false, uirevision: "kept",
     hoverlabel: { align: "left" }, scene: { ...axes, aspectmode: "data", dragmode: "orbit", annotations: scene ? annotationsOf(scene) : [] } };
   if (view) layout.scene.camera = cameraOf(view);
@@ -308,6 +309,7 @@ async function show(view) {
   const stage = data.stages[at];
   showWords(stage);
   await drawScene(view);
+  if (stage !== data.stages[at]) return; // another was asked for meanwhile
   if (data.stages.length > 1) {
     byId("stage").value = at;
     byId("where").textContent = `stage ${at} of ${data.stages.length - 1}: ${words(stage.name)}` + (at === data.crux ? ", the crux" : "");
@@ -323,7 +325,7 @@ async function start() {
   byId("colours").style.background = `linear-gradient(to right, ${data.colours.utilisation.join(",")})`;
   byId("scale").hidden = !hasRobot;
   byId("over").style.background = data.colours.overload;
-  const packed = new Blob([bytesOf(byId("plotly").textContent)]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const packed = (await fetch(`data:;base64,${byId("plotly").textContent}`)).body.pipeThrough(new DecompressionStream("gzip"));
   document.head.append(made("script", await new Response(packed).text()));
   ranges = bounds();
   const views = data.stages.find((s) => s.scene)?.scene.views ?? {};

@@ -63,6 +63,7 @@ class Meshes:
         corners, triangles = surface.vertices.round(4), surface.faces
         if surface.kind == "rock":
             triangles = triangles[np.argsort(surface.triangles.mean(axis=1) @ into, kind="stable")]
+        if surface.kind in ("rock", "mesh"):
             corners, inverse = np.unique(corners, axis=0, return_inverse=True)
             triangles = inverse.ravel()[triangles]
         return {

@@ -36,7 +36,7 @@ class PictureSettings:
     """Number of triangles above which a whole rock is drawn coarsely on a page."""
     wall_cells: int = 100
     """Number of grid cells along such a rock, to which it is coarsened."""
-    robot_triangles: int = 20000
+    robot_triangles: int = 60000
     """Number of triangles of all meshes of a robot's links on a page, at most."""
     link_cell: float = 2e-3
     """Grid size from which on more are coarsened, half as much again each time [m]."""

@@ -78,7 +78,8 @@ def _meshes(robot: Robot, geometry: pin.StdVec_GeometryObject) -> Iterator[LinkM
             continue
         file = each.meshPath, *map(str, each.meshScale)
         if file not in known:
-            corners = [[*shape.tri_indices(i)] for i in range(shape.num_tris)]
+            found = (shape.tri_indices(i) for i in range(shape.num_tris))
+            corners = [(part[0], part[1], part[2]) for part in found]
             vertices = np.array(shape.vertices(), dtype=float).reshape(-1, 3)
             known[file] = Triangles(vertices, np.array(corners, dtype=np.intp).reshape(-1, 3))
         yield LinkMesh(each.parentJoint, pose_of(each.placement), known[file])
