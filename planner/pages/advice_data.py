@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from hand_models.base import CruxError
+from planner import solving
 from planner.advice import changed
 from planner.pages.plan_rows import PageTable
 from planner.pictures import DrawnScene, drawn_scene
 from planner.question import Question
 from planner.result import Advice, HandPlan, Plan
-from planner.solving import solve
 
 __all__ = ["advice_data"]
 
@@ -50,7 +50,7 @@ def _difference(plan: Plan, question: Question, advice: Advice) -> dict[str, Any
     plain = replace(question, want=frozenset(), deadline=None, open_loop=None, explain=False)
     try:
         after = changed(plain, advice.changes)
-        planned = solve.plan(after)
+        planned = solving.plan(after)
         scenes = drawn_scene(plan, question, 2), drawn_scene(planned, after, 2)
     except CruxError:
         return {}

@@ -84,14 +84,14 @@ class Meshes:
             except InvalidInputError as error:
                 self.said.append(f"Capsules stand for the links, whose meshes lack: {error}")
                 found = []
-            drawn = {id(each.triangles): each.triangles for each in found}
+            drawn = {each.file: each.triangles for each in found}
             cell, most = 0.0, PICTURE_SETTINGS.robot_triangles
             while sum(len(each.faces) for each in drawn.values()) > most:
                 cell = 1.5 * cell or PICTURE_SETTINGS.link_cell
                 drawn = {key: coarse(each, cell) for key, each in drawn.items()}
             if cell:
                 self.said.append(f"Links are drawn coarsely, to {1e3 * cell:.0f} mm.")
-            shown = (drawn[id(each.triangles)] for each in found)
+            shown = (drawn[each.file] for each in found)
             surfaces = [self.of(DrawnSurface("mesh", "", *each), WORLD_UP) for each in shown]
             self._links[robot] = list(zip(found, surfaces, strict=True))
         return self._links[robot]

@@ -5,11 +5,6 @@ from .inverse_kinematics import (
     solve_limbs as solve_limbs,
 )
 from .limb_batch import LimbBatch as LimbBatch
-from .link_meshes import (
-    LinkMesh as LinkMesh,
-    joint_poses as joint_poses,
-    link_meshes as link_meshes,
-)
 from .link_tree import LimbTorques as LimbTorques, LinkTree as LinkTree
 from .payload import (
     Payload as Payload,
@@ -25,3 +20,8 @@ from .robot import (
 )
 from .robot_file import RobotFile as RobotFile
 from .tolerances import TOLERANCES as TOLERANCES
+from .visuals import (
+    LinkMesh as LinkMesh,
+    joint_poses as joint_poses,
+    link_meshes as link_meshes,
+)

@@ -391,6 +391,4 @@ def robot_of(file: RobotFile, hand_numbers: ParameterTable | None = None) -> Rob
     """
     hand = spiny_hand(hand_numbers)
     with in_file(file.origin):
-        described = RobotDescription.read(file.toml)
-        folder = (Path(file.origin).parent / described.urdf).parent
-        return Robot(described, file.urdf, hand, folder)
+        return Robot(RobotDescription.read(file.toml), file.urdf, hand, file.folder)

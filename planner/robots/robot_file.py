@@ -46,12 +46,15 @@ class RobotFile:
         Texts of the robot's file and of its URDF.
     origin : str
         Name of the file in error messages.
+    folder : Path, optional
+        Folder of the URDF, if that names meshes.
     """
 
     name: str
     toml: str
     urdf: str
     origin: str = field(default="robot", compare=False)
+    folder: Path = Path()
 
     @classmethod
     def load(cls, path: Path) -> RobotFile:
@@ -65,8 +68,10 @@ class RobotFile:
         with in_file(str(path)):
             toml = path.read_text(encoding="utf-8")
             described = RobotDescription.read(toml)
-            urdf = _urdf(path.parent / described.urdf)
-        return cls(described.name, toml, urdf, str(path))
+            file = path.parent / described.urdf
+            urdf = _urdf(file)
+        folder = file.parent.resolve() if "<mesh" in urdf else Path()
+        return cls(described.name, toml, urdf, str(path), folder)
 
     @classmethod
     @cache

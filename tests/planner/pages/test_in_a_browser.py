@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import shutil
 import subprocess
 from base64 import b64decode
+from dataclasses import replace
 from html import unescape
 
 import numpy as np
@@ -14,7 +16,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from planner import evaluate
+from planner.advice.changes import pose_message
 from planner.pages import write_plan_page, write_route_page
+from planner.result import Advice
 from service.answering import route_of
 from service.commands.cli import run_command_line
 from service.commands.stances import read_route
@@ -63,6 +67,17 @@ STEPS = """
   seen.bars = document.querySelectorAll("#margin .bars .point").length;
 """
 
+ADVISED = """
+  const button = () => document.querySelector("#notes li button");
+  button().focus(); button().click();
+  await settled(() => button().textContent === "hide" && document.activeElement === button());
+  seen.advised = document.getElementById("scene").data.length;
+  seen.button = document.activeElement.textContent;
+  button().click();
+  await settled(() => button().textContent === "draw" && document.activeElement === button());
+  seen.again = document.activeElement.textContent;
+"""
+
 
 def opened(file, steps=""):
     """What a browser shows of a page once its buttons were pressed, and what was seen meanwhile."""
@@ -80,8 +95,13 @@ def opened(file, steps=""):
 
 def test_a_plan_is_drawn_and_its_tables_sort(tmp_path):
     question, plan = answered("solved")
-    write_plan_page(plan, question, tmp_path / "plan.html", "a wall")
-    seen, page = opened(tmp_path / "plan.html")
+    body = replace(question.stance.body, position=question.stance.body.position + 0.02)
+    words = "<img src=x onerror='seen.broken = true'>"
+    changes = {"stance.body": pose_message(body)}
+    advice = Advice("body", [], words, changes, 1.0, "optimal", math.nan, None, True)
+    advised = replace(plan, advice=(advice,), warnings=(words,))
+    write_plan_page(advised, question, tmp_path / "plan.html", "a wall")
+    seen, page = opened(tmp_path / "plan.html", ADVISED)
     assert plan.reason in page
     assert "<canvas" in page
     assert seen["drawn"]
@@ -92,8 +112,11 @@ def test_a_plan_is_drawn_and_its_tables_sort(tmp_path):
             name = f"{hand.limb}, {tile.finger}, {tile.phalanx}<br>".replace("_", " ")
             found = any(name in text and re.search(told, text) for text in seen["hover"])
             assert found == (tile.contact != "none")
-    # of rock, palms, body, links, lines, dots, tiles; and three for each force
-    assert seen["traces"] == 12 + 3 * (len(plan.hands) + 1)
+    # of rock, palms, body, links, lines, dots, tiles, forces; then of the advice
+    assert (seen["traces"], seen["advised"]) == (15, 20)
+    assert (seen["button"], seen["again"]) == ("hide", "draw")
+    assert "broken" not in seen
+    assert page.count("utilisation –") == 1
     used = sorted((round(hand.utilisation, 2) for hand in plan.hands), reverse=True)
     assert (seen["sort"], seen["sorted"]) == ("descending", used)
 
@@ -108,9 +131,10 @@ def test_a_search_is_drawn_on_its_rock_with_its_placements(tmp_path, capfd):
     text = file.read_text("utf-8")
     data = json.loads(re.search(r'id="data">(.*?)</script>', text)[1])
     wall = np.load(folder / "wall.npz")
-    np.testing.assert_allclose(data["wall"]["places"], wall["place_pose"][:, :, 3], atol=6e-5)
-    assert len(data["wall"]["bodies"]) == len(wall["body_pose"])
-    assert (data["wall"]["bound"], data["crux"]) == (reply["bound"], reply["deciding"]["stage"])
+    places, bodies = (group["places"] for group in data["groups"])
+    np.testing.assert_allclose(places, wall["place_pose"][:, :, 3], atol=6e-5)
+    assert len(bodies) == len(wall["body_pose"])
+    assert (data["bound"], data["crux"]) == (reply["bound"], reply["deciding"]["stage"])
     assert min(stage["load_factor"] for stage in data["stages"]) == reply["least"]
     # the rock is whole in each stage, and once in the page
     surfaces = [each for stage in data["stages"] for each in stage["scene"]["surfaces"]]
@@ -123,7 +147,7 @@ def test_a_search_is_drawn_on_its_rock_with_its_placements(tmp_path, capfd):
     assert away.max() < 0.05
     seen, page = opened(file)
     assert "the bound is about the placements" in page
-    assert seen["traces"] == 12 + 2 + 3 * len(data["stages"][data["crux"]]["scene"]["arrows"])
+    assert seen["traces"] == 15 + 2
 
 
 def test_a_climb_is_drawn_stage_by_stage(tmp_path):

@@ -9,17 +9,33 @@ from base64 import b64decode
 from dataclasses import replace
 from functools import cache
 
+import msgspec
 import numpy as np
 import pytest
+import trimesh
 
-from hand_models.base import UnsupportedError
+from hand_models.base import Pose, UnsupportedError
 from hand_models.wrench_spaces import Row, WrenchSpace
 from planner import evaluate
-from planner.pages import document, wrench_slice, write_plan_page, write_route_page
+from planner.advice import changed
+from planner.advice.changes import pose_message
+from planner.pages import (
+    Meshes,
+    document,
+    scene_data,
+    scenes,
+    wrench_slice,
+    write_plan_page,
+    write_route_page,
+)
 from planner.pictures import drawn_scene
+from planner.result import Advice
+from planner.robots import RobotFile, robot_of
+from planner.solving import solve
 from service.answering import route_of
 from service.commands.stances import read_route
 from tests.suite.helpers.pictures import answered
+from tests.suite.helpers.robots import TWO_LINK, limbs_toml
 
 MOST_BYTES = 6e6
 
@@ -162,6 +178,87 @@ def test_without_the_library_a_page_says_what_to_install(monkeypatch):
     monkeypatch.delitem(sys.modules, "plotly.offline", raising=False)
     with pytest.raises(UnsupportedError, match=r"needs plotly.*\[view\]"):
         document("plan", {"stages": [], "meshes": []})
+
+
+def test_an_advice_is_drawn_from_where_things_are_to_where_they_would_be(tmp_path):
+    question, plan = answered("plain")
+    stance, hand = question.stance, question.stance.hands[0]
+    shift, step = np.array([0.0, 0.05, 0.0]), np.array([0.0, 0.0, 0.02])
+    body, palm = Pose(shift, np.eye(3)) @ stance.body, Pose(step, np.eye(3)) @ hand.pose
+    changes = {"stance.body": pose_message(body), "stance.hands[0].pose": pose_message(palm)}
+    advice = Advice("pair", [hand.limb], "<b>move</b>", changes, 1.0, "optimal", 0.5, None, True)
+    advised = replace(plan, advice=(advice,))
+    write_plan_page(advised, question, tmp_path / "plan.html", "a wall")
+    ((found,),) = (s["advice"] for s in data_of((tmp_path / "plan.html").read_text())["stages"])
+    assert (found["sentence"], found["utilisation"], found["holds"]) == ("<b>move</b>", 0.5, True)
+    palm, body = found["moves"]
+    np.testing.assert_allclose(np.subtract(palm["to"], palm["from"]), [step] * 4, atol=2e-4)
+    np.testing.assert_allclose(np.mean(palm["from"], axis=0), hand.pose.position, atol=2e-4)
+    np.testing.assert_allclose(body["from"], [stance.body.position], atol=2e-4)
+    np.testing.assert_allclose(np.subtract(body["to"], body["from"]), [shift], atol=2e-4)
+    after = solve.plan(changed(question, changes))
+    used = [f"{each.hands[0].utilisation:.2f}" for each in (plan, after)]
+    assert palm["text"] == f"{hand.limb.replace('_', ' ')} {used[0]} → {used[1]}"
+    rows = found["table"]["rows"]
+    tensions = [np.concatenate([h.tensions for h in each.hands]) for each in (plan, after)]
+    np.testing.assert_allclose([row[2:4] for row in rows], np.transpose(tensions))
+    assert abs(np.subtract(*tensions)).max() > 1.0
+    # a change that has no stance is said, and not drawn
+    nowhere = msgspec.structs.replace(advice, changes={"stance.hands[0].seat": "nowhere"})
+    write_plan_page(replace(plan, advice=(nowhere,)), question, tmp_path / "plan.html", "a wall")
+    ((found,),) = (s["advice"] for s in data_of((tmp_path / "plan.html").read_text())["stages"])
+    assert sorted(found) == ["holds", "sentence", "utilisation"]
+
+
+def meshed(folder, name="part.stl"):
+    """A plan of a robot whose foot's mesh is a box 0.3 m from the knee, and its question."""
+    shape = f'<origin xyz="-0.1 0 0" rpy="0 0 0"/><geometry><mesh filename="{name}"/></geometry>'
+    foot = f'<link name="foot"><visual>{shape}</visual></link>'
+    urdf = TWO_LINK.replace('<link name="foot"/>', foot)
+    toml = limbs_toml("leg", {"leg": "foot"})
+    (folder / "leg.toml").write_text(toml, "utf-8")
+    (folder / "leg.urdf").write_text(urdf, "utf-8")
+    trimesh.creation.box((0.1, 0.2, 0.4)).export(folder / "part.stl")
+    robot = robot_of(RobotFile.load(folder / "leg.toml"))
+    question, plan = answered("one limb")
+    stance = replace(question.stance, robot=robot)
+    return replace(plan, joints={"leg": [0.2, 0.6]}), replace(question, stance=stance)
+
+
+def test_links_are_drawn_as_the_meshes_of_the_robots_file(tmp_path):
+    plan, question = meshed(tmp_path)
+    meshes = Meshes()
+    scene = scene_data(plan, question, meshes)
+    (link,) = (each for each in scene["surfaces"] if each["kind"] == "mesh")
+    frame = np.reshape(link["pose"], (3, 4))
+    corners = unpacked({"meshes": meshes.packed}, link).reshape(-1, 3) @ frame[:, :3].T
+    middle = (corners + frame[:, 3]).mean(axis=0)
+    # along the shank, which goes on to the hand
+    chain = question.stance.body.apply(question.stance.robot.link_chain(plan.joints, "leg"))
+    along = (chain[2] - chain[1]) / np.linalg.norm(chain[2] - chain[1])
+    np.testing.assert_allclose(middle, chain[1] + 0.3 * along, atol=1e-3)
+    assert [each["kind"] for each in scene["surfaces"]].count("link") == 1
+    assert meshes.said == []
+
+
+def test_meshes_of_many_triangles_are_drawn_coarsely_which_is_said(tmp_path, monkeypatch):
+    plan, question = meshed(tmp_path)
+    settings = replace(scenes.PICTURE_SETTINGS, robot_triangles=8)
+    monkeypatch.setattr(scenes, "PICTURE_SETTINGS", settings)
+    meshes = Meshes()
+    surfaces = scene_data(plan, question, meshes)["surfaces"]
+    (link,) = (each for each in surfaces if each["kind"] == "mesh")
+    assert len(unpacked({"meshes": meshes.packed}, link)) <= 8
+    assert re.fullmatch(r"Links are drawn coarsely, to \d+ mm.", meshes.said[0])
+
+
+def test_capsules_stand_for_links_whose_meshes_are_not_there(tmp_path):
+    plan, question = meshed(tmp_path, "package://elsewhere/part.dae")
+    meshes = Meshes()
+    kinds = [each["kind"] for each in scene_data(plan, question, meshes)["surfaces"]]
+    assert "mesh" not in kinds
+    assert kinds.count("link") == 2
+    assert "part.dae" in meshes.said[0]
 
 
 # Slices -------------------------------------------------------------------------------------------

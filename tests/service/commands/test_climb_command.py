@@ -84,10 +84,10 @@ def test_it_is_proven_that_a_wall_with_a_gap_cannot_be_climbed(tmp_path, capsys)
 
 @pytest.mark.slow
 def test_the_demonstration_climbs_and_its_route_is_planned_again(tmp_path, capsys):
-    folder = tmp_path / "out"
-    assert run_command_line(["demo", "--climb", str(folder), "--json"]) == 0
+    folder, page = tmp_path / "out", str(tmp_path / "climb.html")
+    assert run_command_line(["demo", "--climb", str(folder), "--html", page, "--json"]) == 0
     reply = json.loads(capsys.readouterr().out)
-    assert reply["status"] == "found"
+    assert (reply["status"], reply["files"]["page"]) == ("found", page)
     assert 1.0 <= reply["least"] <= 1.05 * reply["bound"]
     # its first stage is given: none of another climb can hold more than its linear program says
     assert reply["deciding"]["stage"] == 0

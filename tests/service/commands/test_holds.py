@@ -37,10 +37,11 @@ def rock(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_holds_are_written_sorted_and_drawn(rock, tmp_path, capfd):
-    output, picture = tmp_path / "holds.json", tmp_path / "holds.png"
+    output, picture, page = (tmp_path / f"holds.{ending}" for ending in ("json", "png", "html"))
     twice = ["--outer-rotation", "0"]  # which is no other hand
     options = ["-o", str(output), *COARSE, *twice, "--samples", "2", "--workers", "1"]
-    assert run_command_line(["holds", str(rock), *options, "--plot", str(picture)]) == DONE
+    drawn = ["--plot", str(picture), "--html", str(page)]
+    assert run_command_line(["holds", str(rock), *options, *drawn]) == DONE
     out, _ = capfd.readouterr()
     assert max(map(len, out.splitlines()[:-1])) <= 80
     assert "16 trials at 16 points" in out
@@ -53,6 +54,7 @@ def test_holds_are_written_sorted_and_drawn(rock, tmp_path, capfd):
     assert out.splitlines()[-1] == f"{output} (in m, rad, N)"
     assert len(held) + told["refused"] <= 16
     check_refusals(told)
+    check_page(page, told)
     assert (told["samples"], told["direction"], told["force"]) == (2, "-fz", 0.1)
     assert told["sort"] == "robust"
     assert {hold["samples"] for hold in held} == {2}
@@ -63,6 +65,23 @@ def test_holds_are_written_sorted_and_drawn(rock, tmp_path, capfd):
         assert hold["pure_pull_off"] == hold["pure"]["-fz"]
         assert (hold["pure_tenth"]["-fz"] >= 0.1) == (hold["share"]["-fz"] == 1.0)
         assert 0.0 <= hold["pure_tenth"]["-fz"] <= max(hold["tenth"]["-fz"], 0.0)
+
+
+def check_page(page: Path, told: dict) -> None:
+    """Each point is there once: a hold with its value, or refused, with the reasons' kinds."""
+    data = json.loads(re.search(r'id="data">(.*?)</script>', page.read_text("utf-8"))[1])
+    holds, *refused = data["groups"]
+    best = {tuple(hold["place"]["point"]): hold for hold in reversed(told["holds"])}
+    off = [[round(x, 4), round(y, 4), round(z - 0.01, 4)] for x, y, z in best]
+    assert sorted(holds["places"]) == sorted(off)
+    assert sorted(holds["values"]) == sorted(100 * hold["share"]["-fz"] for hold in best.values())
+    reasons = {tuple(each["point"]): each["reasons"] for each in told["refusals"]}
+    texts = [text for group in refused for text in group["texts"]]
+    alone = [there for point, there in reasons.items() if point not in best]
+    assert len(texts) == told["trials"] - len(best)
+    assert all(any(f"1 × {why}" in text for text in texts) for there in alone for why in there)
+    (table,) = data["stages"][0]["tables"]
+    assert [row[6] for row in table["rows"]] == [hold["pure"]["-fz"] for hold in told["holds"]]
 
 
 MEASURES = ("pure_tenth", "share", "pure", "support")

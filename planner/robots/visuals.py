@@ -18,7 +18,7 @@ __all__ = ["LinkMesh", "joint_poses", "link_meshes"]
 
 
 class LinkMesh(NamedTuple):
-    """What one ``<visual>`` of a robot's URDF has as a mesh.
+    """Mesh of one ``<visual>`` of a robot's URDF.
 
     Attributes
     ----------
@@ -26,12 +26,15 @@ class LinkMesh(NamedTuple):
         Index in Pinocchio's model of the joint that the mesh moves with.
     pose : Pose
         Pose of the mesh in that joint's frame.
+    file : str
+        Path of the mesh, and its scale.
     triangles : Triangles
-        In the mesh's own frame [m]; the same object wherever the file is the same.
+        In the mesh's own frame [m].
     """
 
     joint: int
     pose: Pose
+    file: str
     triangles: Triangles
 
 
@@ -45,13 +48,12 @@ def link_meshes(robot: Robot) -> list[LinkMesh]:
     InvalidInputError
         If a mesh cannot be read.
     """
-    folder = robot.folder.resolve()
     if "<mesh" not in robot.urdf:
         return []
     # names without a scheme are from the URDF's folder
     plain = r"(<mesh\b[^>]*\bfilename=[\"'])(?!/|\w+:)"
-    text = re.sub(plain, lambda match: f"{match[1]}{folder}/", robot.urdf)
-    above = [str(each) for each in (folder, *folder.parents)]
+    text = re.sub(plain, lambda match: f"{match[1]}{robot.folder}/", robot.urdf)
+    above = [str(each) for each in (robot.folder, *robot.folder.parents)]
     try:
         found = pin.buildGeomFromUrdfString(
             robot.model, text, pin.GeometryType.VISUAL, package_dirs=above
@@ -71,15 +73,15 @@ def joint_poses(robot: Robot, angles: Angles) -> list[Pose]:
 def _meshes(robot: Robot, geometry: pin.StdVec_GeometryObject) -> Iterator[LinkMesh]:
     """Yield the meshes, not the boxes and cylinders, that move with the body or a limb."""
     moved = {ROOT_JOINT, *(joint for chain in robot.chains.values() for joint in chain.ids)}
-    known: dict[tuple[str, ...], Triangles] = {}
+    known: dict[str, Triangles] = {}
     for each in geometry:
         shape = each.geometry
         if each.parentJoint not in moved or not hasattr(shape, "tri_indices"):
             continue
-        file = each.meshPath, *map(str, each.meshScale)
+        file = f"{each.meshPath} {each.meshScale}"
         if file not in known:
             found = (shape.tri_indices(i) for i in range(shape.num_tris))
             corners = [(part[0], part[1], part[2]) for part in found]
             vertices = np.array(shape.vertices(), dtype=float).reshape(-1, 3)
             known[file] = Triangles(vertices, np.array(corners, dtype=np.intp).reshape(-1, 3))
-        yield LinkMesh(each.parentJoint, pose_of(each.placement), known[file])
+        yield LinkMesh(each.parentJoint, pose_of(each.placement), file, known[file])
