@@ -44,6 +44,7 @@ from .explanation import (
 )
 from .pages import (
     PageTable as PageTable,
+    PlaceGroup as PlaceGroup,
     write_climb_page as write_climb_page,
     write_holds_page as write_holds_page,
     write_plan_page as write_plan_page,

@@ -14,7 +14,7 @@ from hand_models.rock import Mesh
 from planner.climbs import FoundClimb
 from planner.pages.documents import write_document
 from planner.pages.route_page import shown_stages
-from planner.pages.scenes import Meshes, rock_data, rock_stage
+from planner.pages.scenes import Meshes, rock_stage
 from planner.programs import WRENCH_UNIT
 
 __all__ = ["write_climb_page"]
@@ -46,10 +46,8 @@ def write_climb_page(
         If plotly is not installed.
     """
     meshes, wall = Meshes(), found.wall
-    meshes.rock, views = rock_data(rock.triangles, rock_pose, meshes)
-    if found.result is None:
-        stages = [rock_stage(meshes.rock, views, status=found.status)]
-    else:
+    stages = [rock_stage(rock.triangles, rock_pose, meshes, status=found.status)]
+    if found.result is not None:
         stages = shown_stages(found.result, meshes)
     lifts = wall.screening.hands.supports(np.eye(6)[2:3])[:, 0] * WRENCH_UNIT[2]
     groups: list[dict[str, Any]] = [

@@ -154,7 +154,7 @@ const axis = (title) => ({ title: { text: title }, color: ink("dim"), gridcolor:
 const vector = (v, length) => Object.fromEntries(["x", "y", "z"].map((c, k) => [c, length * v[k]]));
 function cameraOf(view) { // farther away in a narrow window, and from what is flat
   const { clientWidth, clientHeight } = byId("scene"), sizes = ranges.map(([low, high]) => high - low);
-  const flat = Math.max(...sizes) / Math.cbrt(sizes[0] * sizes[1] * sizes[2]), far = 1.5 * Math.max(1.2, flat) * Math.max(1, 1.1 * clientHeight / clientWidth);
+  const flat = Math.max(...sizes) / Math.cbrt(sizes[0] * sizes[1] * sizes[2]), far = 1.75 * Math.max(1, flat) * Math.max(1, 1.1 * clientHeight / clientWidth);
   return { eye: vector(view.eye, far), up: vector(view.up, 1), center: vector([0, 0, 0], 0) };
 }
 
@@ -335,7 +335,7 @@ async function start() {
     byId("views").append(button);
   }
   for (const name of Object.keys(shownKinds)) {
-    const label = made("label", ` ${name}`), box = Object.assign(made("input"), { type: "checkbox", checked: shownKinds[name] });
+    const count = data.groups?.find((g) => g.name === name)?.places.length, label = made("label", count === undefined ? ` ${name}` : ` ${name} (${count})`), box = Object.assign(made("input"), { type: "checkbox", checked: shownKinds[name] });
     box.onchange = () => { shownKinds[name] = box.checked; show(); };
     label.prepend(box); byId("views").append(label);
   }

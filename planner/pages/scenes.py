@@ -21,7 +21,7 @@ from planner.question import HandOnHold, Question
 from planner.result import HandPlan, Plan
 from planner.robots import ROOT_JOINT, LinkMesh, Robot, joint_poses, link_meshes
 
-__all__ = ["Meshes", "rock_data", "rock_stage", "scene_data"]
+__all__ = ["Meshes", "rock_stage", "scene_data"]
 
 
 class Meshes:
@@ -97,38 +97,22 @@ class Meshes:
         return self._links[robot]
 
 
-def rock_data(
-    rock: Triangles, pose: Pose, meshes: Meshes
-) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-    """Return the surface of a whole rock, coarsely if that has many triangles, and its views.
+def rock_stage(rock: Triangles, pose: Pose, meshes: Meshes, **more: Any) -> dict[str, Any]:
+    """Return a stage of a page that has rock alone, with ``more`` of its fields.
 
-    Parameters
-    ----------
-    rock : Triangles
-        Its frame has x up the rock and z into it.
-    pose : Pose
-        Of that frame in the frame of the page.
-    meshes : Meshes
-        Meshes of the page, to which the rock is added.
+    The rock, coarsely if it has many triangles, becomes that of all scenes of the page. Its frame
+    has x up the rock and z into it; ``pose`` is that frame in the frame of the page.
     """
     up, across, into = pose.rotation.T
     if len(rock.faces) > PICTURE_SETTINGS.wall_triangles:
         extent = float(np.ptp(rock.vertices, axis=0).max())
         rock = coarse(rock, extent / PICTURE_SETTINGS.wall_cells)
-    surface = DrawnSurface("rock", "", pose.apply(rock.vertices), rock.faces)
+    meshes.rock = meshes.of(DrawnSurface("rock", "", pose.apply(rock.vertices), rock.faces), into)
     eyes = {"oblique": 0.6 * across - 0.8 * into, "facing the rock": -into}
     views = {name: {"eye": eye.tolist(), "up": up.tolist()} for name, eye in eyes.items()}
-    return meshes.of(surface, into), views
-
-
-def rock_stage(rock: dict[str, Any], views: dict[str, Any], **more: Any) -> dict[str, Any]:
-    """Return a stage of a page that has rock alone, with more of its fields."""
-    empty: dict[str, Any] = {"lines": [], "dots": [], "arrows": [], "labels": [], "tiles": []}
-    return {
-        "name": "",
-        "sentence": "",
-        "scene": empty | {"surfaces": [rock], "views": views},
-    } | more
+    scene: dict[str, Any] = {"lines": [], "dots": [], "arrows": [], "labels": [], "tiles": []}
+    scene |= {"surfaces": [meshes.rock], "views": views}
+    return {"name": "", "sentence": "", "scene": scene} | more
 
 
 def scene_data(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]:

@@ -247,12 +247,10 @@ def holds_command(
         if isinstance(broken, CruxError):
             raise CruxError(f"{broken.message}; {kept}")
         raise processes.Interrupted(kept)
-    if picture is not None:
-        with tables.writing(picture):
-            tables.draw_holds(mesh, trials, outcomes, found, result, picture)
-    if page is not None:
-        with tables.writing(page, "--html"):
-            tables.write_holds(mesh, trials, outcomes, found, result, page)
+    for path, field in ((picture, "--plot"), (page, "--html")):
+        if path is not None:
+            with tables.writing(path, field):
+                tables.draw_holds(mesh, trials, outcomes, found, result, path)
     if as_json:
         summary = {name: value for name, value in result.items() if name != "refusals"}
         tables.say({**summary, "holds": len(found), "file": str(output)})

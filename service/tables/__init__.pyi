@@ -30,7 +30,6 @@ from .holds import (
     print_holds as print_holds,
     refusal_kind as refusal_kind,
     refusals_json as refusals_json,
-    write_holds as write_holds,
 )
 from .layout import (
     VERBOSITY_KEY as VERBOSITY_KEY,

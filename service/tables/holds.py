@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from hand_models.hand import Placing
     from hand_models.rock import Mesh
 
-__all__ = ["draw_holds", "hold_json", "print_holds", "refusal_kind", "refusals_json", "write_holds"]
+__all__ = ["draw_holds", "hold_json", "print_holds", "refusal_kind", "refusals_json"]
 
 SHOWN_HOLDS: Final = 10
 """Number of the best holds that are printed, and drawn."""
@@ -224,33 +224,7 @@ def draw_holds(
     result: Mapping[str, Any],
     path: Path,
 ) -> None:
-    """Draw the best hold at each point, and points without one; parameters as `write_holds`."""
-    from hand_models.scans import plot_holds
-
-    label, first = _values(found, result)
-    marks = _marks(trials, outcomes, {point: value for point, (_, value) in first.items()})
-    known = {point: value for point, (_, value) in first.items() if not math.isnan(value)}
-    plot_holds(
-        mesh.triangles,
-        np.array(list(known)).reshape(-1, 3),
-        np.array(list(known.values())),
-        {f"{words} ({len(at)})": np.array(at) for words, at in marks},
-        [each.pose for _, each in found[:SHOWN_HOLDS]],
-        path,
-        f"holds on {Path(result['rock']).name}: the best hand at each point",
-        label,
-    )
-
-
-def write_holds(
-    mesh: Mesh,
-    trials: Sequence[HoldTrial],
-    outcomes: Outcomes,
-    found: Sequence[Pair],
-    result: Mapping[str, Any],
-    path: Path,
-) -> None:
-    """Write a page with the best hold at each point, and why there is none at others.
+    """Draw the best hold at each point, and points without one, as a picture or as a page.
 
     Parameters
     ----------
@@ -265,12 +239,23 @@ def write_holds(
     result : mapping
         Content of the file of the holds, as in `print_holds`.
     path : Path
-        File to write.
+        File to write; a page if it ends in ``.html``.
     """
+    label, first = _values(found, result)
+    marks = _marks(trials, outcomes, {point: value for point, (_, value) in first.items()})
+    known = {point: each for point, each in first.items() if not math.isnan(each[1])}
+    values, name = [value for _, value in known.values()], f"holds on {Path(result['rock']).name}"
+    if path.suffix.lower() != ".html":
+        from hand_models.scans import plot_holds
+
+        refused = {f"{words} ({len(at)})": np.array(at) for words, at in marks}
+        points, best = np.array(list(known)).reshape(-1, 3), found[:SHOWN_HOLDS]
+        poses, title = [each.pose for _, each in best], f"{name}: the best hand at each point"
+        plot_holds(mesh.triangles, points, np.array(values), refused, poses, path, title, label)
+        return
     import planner
 
     way, degree, most = result["direction"], 180.0 / math.pi, 500  # rows of the table
-    label, first = _values(found, result)
     columns = "hold,x [m],y [m],z [m],wrist [°],outer fingers [°]"
     columns += f",{way} alone [N],{way} with others [N],{way} alone in 9 of 10 [N],share [%]"
     rows: list[list[Any]] = []
@@ -282,25 +267,16 @@ def write_holds(
         row += [tenth and tenth[way], None if share is None else 100.0 * share[way]]
         rows.append(row)
     reasons = {tuple(each["point"]): each["reasons"] for each in result["refusals"]}
-    marks = _marks(trials, outcomes, {point: value for point, (_, value) in first.items()})
-    refused = {
-        words: [
-            (at, "\n".join([words, *(f"{n} × {why}" for why, n in reasons.get(at, {}).items())]))
-            for at in places
-        ]
-        for words, places in marks
-    }
-    holds = [
-        (
-            point,
-            value,
-            f"hold {i + 1}\n{label}: {value:.1f}\nwrist {degree * found[i][0].wrist_angle:.0f}°, "
-            f"outer fingers {degree * found[i][0].outer_rotation:.0f}°",
-        )
-        for point, (i, value) in first.items()
-        if not math.isnan(value)
+    texts = [
+        f"hold {i + 1}\n{label}: {value:.1f}\nwrist {degree * found[i][0].wrist_angle:.0f}°, outer "
+        f"fingers {degree * found[i][0].outer_rotation:.0f}°"
+        for i, value in known.values()
     ]
-    name = Path(result["rock"]).name
+    groups = [planner.PlaceGroup("holds", list(known), texts, values, label)] if known else []
+    for words, places in marks:
+        whys = (reasons.get(at, {}).items() for at in places)
+        texts = ["\n".join(f"{n} × {why}" for why, n in each) or words for each in whys]
+        groups.append(planner.PlaceGroup(words, places, texts))
     said = [
         f"{result['tried']:,} hands were tried, {result['refused']:,} of them cannot be where they "
         f"were tried, {len(found):,} hold something.",
@@ -309,9 +285,7 @@ def write_holds(
     ]
     title = f"The best {most} holds" if len(found) > most else "Holds"
     table = planner.PageTable(title, columns, rows)
-    planner.write_holds_page(
-        mesh.triangles, holds, refused, label, table, path, f"holds on {name}", said
-    )
+    planner.write_holds_page(mesh.triangles, groups, table, path, name, said)
 
 
 def _values(
