@@ -89,9 +89,7 @@ def _write_forces(
         dragged = state.been[j] or state.mode[j] == code.on
         # where a joint's stop carries what a phalanx does, its spines are drawn in by nothing
         bears = share > 0.0 and (not off or state.stop[j] == 0)
-        drag = 0.0
-        if bears:
-            drag = drive.drag[j] * (1.0 if dragged else part)
+        drag = drive.drag[j] * (1.0 if dragged else part) if bears else 0.0
         found.shears[j], d_shears[j] = drag * share * f, drag * f
         found.grows[j] = 0.0
         if drive.lowers and bears:
@@ -251,7 +249,7 @@ def _try(
     found: Record,
 ) -> None:
     """Write what becomes of a finger in its contact state, and this after the next switch."""
-    gives, deep, nothing = settings.held_gap * shape.length, shape.closes, np.zeros(JOINT_COUNT)
+    play, deep, nothing = settings.held_gap * shape.length, shape.closes, np.zeros(JOINT_COUNT)
     _write_forces(settings, code, drive, state, around, found)
     apart, share = nothing.copy(), nothing.copy()
     for j in range(JOINT_COUNT):
@@ -272,6 +270,8 @@ def _try(
         if far and not found.active[j] and change[j] < 0.0:
             clear = min(clear, around.gap[j] / -change[j])
     found.size, found.clear = size, clear
+    # spines hold where a gap has grown by more than its linearisation may err
+    gives = min(play, 2.0 * deep + settings.gap_error * size**2)
     part = min(clear, state.stride / max(size, settings.still_turn))
     # damped joints may be slow in leaving where they should not be
     slow = state.damping > settings.slow_damping * drive.torque
@@ -289,7 +289,7 @@ def _try(
                 over[j] = _over(settings, drive, j, grip, found.shears[j], normal)
             pushes[j] = mode == code.held and normal > settings.rounding
             # contacts that joints cannot bring to the rock, as others or stops are in the way
-            cannot[j] = settings.contact_compliance * normal - gives if mode == code.on else 0.0
+            cannot[j] = settings.contact_compliance * normal - play if mode == code.on else 0.0
         else:
             # gaps that would close, or grow beyond what spines let them
             nears = change[j] < 0.0 and around.gap[j] > settings.near_gap * shape.length

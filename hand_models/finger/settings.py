@@ -92,7 +92,9 @@ class FingerSettings:
     """Gap below which a phalanx may reach the rock in an increment in which others move as well;
     beyond it contacts close one after the other, so that the least gaps are those of the path."""
     held_gap: float = 1.0 / 4800.0
-    """Growth of a gap before its spines hold."""
+    gap_error: float = 0.1
+    """Growth of a gap before its spines hold, at most, and error of a gap over the square of the
+    turn to it [m/rad²]."""
     contact_compliance: float = 1e-11
     """Compliance of contacts, which makes the forces of coincident contacts unique [m/N]."""
     rounding: float = BASE_TOLERANCES.force

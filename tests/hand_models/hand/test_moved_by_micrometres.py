@@ -58,6 +58,18 @@ def test_at_each_micrometre_contacts_and_supports_are_as_beside_it():
         assert scan.steps().max() < STEP
 
 
+HELD = {11: 3.25}
+"""Seeds of hands, and places [µm] from which on a gap that grows after its least once grew by 5 µm:
+its spines held it no sooner, and then drew it back all the way."""
+
+
+def test_spines_hold_at_the_least_gap_as_soon_as_it_grows():
+    for seed, place in HELD.items():
+        scan = scanned(*random_placement(seed), [place - 0.25, place, place + 0.25, place + 0.5])
+        # a support changes by as much all the way there: by 1 % each micrometre
+        assert scan.steps().max() < 0.35 * STEP
+
+
 BOWLS = [
     (0.033, 24.0, -47),
     (0.033, 23.0, -43),

@@ -102,8 +102,8 @@ def random_placement(seed: int) -> tuple[Placement, np.ndarray]:
     raise ValueError(f"no hand of seed {seed} closes")
 
 
-def scanned(placement: Placement, way: np.ndarray, places: Sequence[int] = range(PLACES)) -> Scan:
-    """Close a hand with its rock moved along a direction by whole micrometres."""
+def scanned(placement: Placement, way: np.ndarray, places: Sequence[float] = range(PLACES)) -> Scan:
+    """Close a hand with its rock moved along a direction by micrometres."""
     pose = placement.hold_in_hand
     assert pose is not None
     moved = [
