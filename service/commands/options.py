@@ -14,7 +14,7 @@ from click.shell_completion import CompletionItem
 
 import planner
 from hand_models.base import InvalidInputError, installed_version, to_install
-from service import answering, bulk, processes, requests, serving
+from service import answering, bulk, processes, requests, serving, tables
 from service.commands import stances
 
 if TYPE_CHECKING:
@@ -261,17 +261,20 @@ def _check_dask(_: click.Context, __: click.Parameter, address: str | None) -> s
 
 def _check_folder(_: click.Context, __: click.Parameter, path: Path) -> Path:
     """Refuse a folder with the file ending of a table or a picture."""
-    tables = (".csv", ".parquet", ".json", ".jsonl")
-    if path.suffix.lower() in (*tables, *PICTURE_ENDINGS) and not path.is_dir():
+    files = (".csv", ".parquet", ".json", ".jsonl", *PICTURE_ENDINGS)
+    if path.suffix.lower() in files and not path.is_dir():
         raise click.BadParameter(f"{path}: must be a folder for several files, not a {path.suffix}")
     return path
 
 
-def _check_page(_: click.Context, __: click.Parameter, path: Path | None) -> Path | None:
-    """Refuse a page, before any work is done, if the library that draws it is not installed."""
-    if path is not None and installed_version("plotly") is None:
+def _check_output(_: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
+    """Lock a picture or page until the command ends; refuse a page that nothing here can draw."""
+    option = parameter.opts[-1]
+    if path and option == "--html" and installed_version("plotly") is None:
         message = f"needs plotly, which is not installed: {to_install('view')}"
-        raise InvalidInputError(message, field="--html")
+        raise InvalidInputError(message, field=option)
+    if path:
+        tables.write_alone(path, option=option)
     return path
 
 
@@ -287,19 +290,16 @@ def _limbs(context: click.Context, _: click.Parameter, begun: str) -> list[Compl
 stance_argument = click.argument(
     "stance", shell_complete=stances.beginning_so(stances.bundled(), files=True)
 )
+_routes = stances.beginning_so(stances.bundled(requests.RouteRequest), files=True)
 routes_argument = click.argument(
-    "routes",
-    nargs=-1,
-    required=True,
-    metavar="ROUTE...",
-    shell_complete=stances.beginning_so(stances.bundled(requests.RouteRequest), files=True),
+    "routes", nargs=-1, required=True, metavar="ROUTE...", shell_complete=_routes
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 page_option = click.option(
     "--html",
     "page",
     type=OutputFile(".html"),
-    callback=_check_page,
+    callback=_check_output,
     metavar="FILE",
     help="Page for a browser to write: one file, which loads nothing else.",
 )
@@ -382,8 +382,8 @@ workers_options = asked_for(
 
 def plot_option(text: str) -> Callable[[Command], Command]:
     """Return the option ``--plot`` with a help text; the command gets the path as ``picture``."""
-    kind = OutputFile(*PICTURE_ENDINGS)
-    return click.option("--plot", "picture", type=kind, metavar="FILE", help=text)
+    kind, check = OutputFile(*PICTURE_ENDINGS), _check_output
+    return click.option("--plot", "picture", type=kind, callback=check, metavar="FILE", help=text)
 
 
 def folder_option(text: str) -> Callable[[Command], Command]:

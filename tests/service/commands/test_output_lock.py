@@ -126,12 +126,14 @@ def commands(few: Path, rock: Path, folder: Path) -> dict[str, tuple[list[str], 
         "demo": (["demo", "-o", str(folder / "d.png")], folder / ".d.png.lock"),
         "demo, a climb": (["demo", "--climb", str(out)], out / ".crux.lock"),
         "advice": (["plan", "wall-300", "--advice", str(out)], out / ".crux.lock"),
+        "picture": (["plan", "wall-300", "--plot", str(folder / "p.svg")], folder / ".p.svg.lock"),
+        "page": (["plan", "wall-300", "--html", str(folder / "p.html")], folder / ".p.html.lock"),
         "study": (["study", "fig06", "-o", str(out)], out / ".crux.lock"),
     }
 
 
 NAMES = tuple(commands(Path(), Path(), Path()))
-LONG = ("route", "routes", "demo", "demo, a climb", "advice", "study")
+LONG = ("route", "routes", "demo", "demo, a climb", "advice", "picture", "page", "study")
 
 
 @pytest.mark.parametrize("name", NAMES)
