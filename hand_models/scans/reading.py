@@ -64,7 +64,7 @@ ENDING_BY_BEGINNING: Final = {
     b"7z\xbc\xaf": ".7z",
     b"glTF": ".glb",
 }
-"""First bytes of files, by which a file with the ending of another kind is told."""
+"""First bytes of files, by which a file with the ending of another kind is recognised."""
 
 
 def read_scan(

@@ -61,7 +61,7 @@ def force_unit(part: float) -> str | None:
     for unit, newtons, off in (
         ("kN", 1e3, 2.5),
         ("kgf", scene_number("usual", "standard_gravity"), 1.25),
-        # no decimal power tells it from a part of the weight
+        # no decimal power separates it from a part of the weight
         ("lbf", _pound_force(), 1.0 + SCENE_SETTINGS.unit_factor),
     ):
         if 1.0 / off <= part * newtons <= off:
