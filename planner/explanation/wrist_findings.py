@@ -57,7 +57,9 @@ def palm_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterat
         f"{', and '.join(words)}"
     )
     if others := len(lacking) - 1:
-        message += f" ({others} other palm{'s' * (others > 1)} would have to move, too, not farther)"
+        message += (
+            f" ({others} other palm{'s' * (others > 1)} would have to move, too, not farther)"
+        )
     if not prepared.question.stance.hands[i].grasp.fingernail:
         message += "; 'wrist': 'compliant' plans with wrists that move"
     yield Finding("palm_without_travel", f"stance.hands[{i}].wrist", message, lacks, "m")

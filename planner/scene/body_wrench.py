@@ -78,8 +78,8 @@ class WrenchCheck:
             return []
         message = (
             f"body_wrench: a force of {force:.4g} N, about the robot's weight of "
-            f"{self._weight:.4g} N, points {math.degrees(angle):.0f}° off up: is it in B, not in W, "
-            "and what the rock exerts on the robot, not gravity itself?"
+            f"{self._weight:.4g} N, points {math.degrees(angle):.0f}° off up: is it in B, not in "
+            "W, and what the rock exerts on the robot, not gravity itself?"
         )
         return [Finding("wrench_not_up", "body_wrench", message, angle, "rad")]
 

@@ -135,7 +135,7 @@ def _say_more_or_less(command: click.Command) -> click.Command:
             is_flag=True,
             expose_value=False,
             callback=_verbosity,
-            help="Say less: the outcome, errors and numbers in doubt; no tables, progress or remarks.",
+            help="Say less: outcome, errors, numbers in doubt; no tables, progress or remarks.",
         ),
     ]
     return command

@@ -245,19 +245,13 @@ def _got(
 
 def _other_unit(value: float, unit: str | None, bound: float) -> str | None:
     """Return another unit in which a number that is beyond a bound would be within it."""
-    match unit:
-        case "m":
-            other, factor = "mm", 1e-3
-        case "kg":
-            other, factor = "g", 1e-3
-        case "m/s²":
-            other, factor = "mm/s²", 1e-3
-        case "N·m":
-            other, factor = "N·mm", 1e-3
-        case "N/m":
-            other, factor = "N/mm", 1e3
-        case _:
-            return None
+    other, factor = {
+        "m": ("mm", 1e-3),
+        "kg": ("g", 1e-3),
+        "m/s²": ("mm/s²", 1e-3),
+        "N·m": ("N·mm", 1e-3),
+        "N/m": ("N/mm", 1e3),
+    }.get(unit or "", (None, 1.0))
     # of zero, and across zero, no unit makes anything else
     if not value * bound > 0.0:
         return None

@@ -13,7 +13,7 @@ from hand_models.base import Pose
 from hand_models.rock import Cylinder, Edge, Ellipsoid, Plane, Sphere
 from planner.question import ForceCap, HandOnHold, Limits, Load, Question
 from planner.robots import Payload, RobotFile, robosimian, robot_of
-from planner.scene import unit_findings, wrench_findings
+from planner.scene import WrenchCheck, unit_findings, wrench_findings
 from planner.solving import KnownStance, plan
 from service.answering.questions import question
 from service.commands.stances import read_request
@@ -109,6 +109,10 @@ WRONG = {
     "com in mm": (load(com=(0.33, -0.82, -132.9)), "load.com"),
     "com in cm": (load(com=(0.0, 3.0, -13.3)), "load.com"),
     "payload in g": (carried(2000.0), "load.payloads[0].mass"),
+    "payload in t": (carried(0.006), "load.payloads[0].mass"),
+    "margin of holds in kN": (limits(hold_margin=0.002), "limits.hold_margin"),
+    "margin of palms in kN": (limits(palm_margin=0.01), "limits.palm_margin"),
+    "least tension in kN": (limits(least_tension=0.03), "limits.least_tension"),
     "payload of a limb in g": (carried(900.0, limb="front_left"), "load.payloads[0].mass"),
     "payload's place in mm": (carried(2.0, (0.0, 0.0, 120.0)), "load.payloads[0].com"),
     "payload's place in cm": (carried(2.0, (3.0, -4.0, 12.0)), "load.payloads[0].com"),
@@ -201,6 +205,53 @@ def test_another_unit_is_told_with_its_field():
             assert len(found) == (len(asked.stance.hands) if "strength of a tile" in slip else 1)
 
 
+def turned_off(asked, angle, size=1.0):
+    """The wrench that a stance needs, its force turned off up by an angle and scaled."""
+    own = needed(asked)
+    level = np.cross(own[:3], [0.3, -0.5, 0.8])
+    turn = Rotation.from_rotvec(angle * level / np.linalg.norm(level)).as_matrix()
+    return replace(asked, body_wrench=np.concatenate([size * turn @ own[:3], own[3:]]))
+
+
+def test_a_weight_that_is_not_held_up_is_doubted():
+    for base in BASES:
+        asked = Question(BASES[base]())
+        own, turn = needed(asked), asked.stance.body.rotation
+        in_world = np.concatenate([turn @ own[:3], turn @ own[3:]])
+        gravity = -own
+        off = np.degrees(np.arccos(in_world[:3] @ own[:3] / (own[:3] @ own[:3])))
+        for wrench, angle in ((in_world, off), (gravity, 180.0)):
+            found = wrench_findings(replace(asked, body_wrench=wrench))
+            assert [each.kind for each in found] == ["wrench_not_up"] * int(angle >= 60.0)
+            for each in found:
+                assert each.field == "body_wrench"
+                assert each.doubts_number
+                assert np.degrees(each.value) == pytest.approx(angle, abs=1e-4)
+                assert "in B, not in W" in each.message
+                assert "not gravity itself" in each.message
+        # bounds of angle and size, from inside and from outside
+        for angle, size, odd in (
+            (1.06, 1.0, True),
+            (1.03, 1.0, False),
+            (1.06, 1.45, True),
+            (1.06, 1.55, False),
+            (1.06, 0.7, True),
+            (1.06, 0.63, False),
+        ):
+            assert bool(wrench_findings(turned_off(asked, angle, size))) == odd
+
+
+def test_a_load_that_is_given_is_what_its_wrenches_are_held_against():
+    asked = replace(Question(on_wall()), load=Load(mass=400.0))
+    own, check = needed(asked), WrenchCheck(asked)
+    assert check.findings(own) == ()
+    (found,) = check.findings(-own)
+    assert found.kind == "wrench_not_up"
+    (found,) = check.findings(own / 1000.0)
+    assert "the robot weighs 3924 N" in found.message
+    assert WrenchCheck(Question(on_wall())).findings(-own) == ()
+
+
 def load_factor_probe(axis, sign):
     direction = np.zeros(6)
     direction[axis] = sign
@@ -228,6 +279,10 @@ SOUND = {
     "a lorry": load(mass=3000.0),
     "a pack on its back": load(mass=150.0, com=(0.0, 0.0, 0.4)),
     "a pack": carried(60.0, (0.0, 0.0, 0.3)),
+    "a small margin": limits(hold_margin=0.5, palm_margin=1.0, least_tension=2.0),
+    "a rope aside": lambda asked: replace(
+        asked, body_wrench=needed(asked) + np.array([0.0, 900.0, 0.0, 0.0, 0.0, 0.0])
+    ),
     "a sensor": carried(0.02, (0.3, 0.0, 0.1)),
     "a lamp on a hand": carried(0.3, (0.0, 0.1, 0.1), limb="front_left"),
     "a boom": load(mass=120.0, com=(1.2, 0.0, 0.2)),
@@ -372,7 +427,7 @@ def test_plans_tell_it_in_words_and_structured():
     (found,) = [each for each in answer.findings if each.kind == "unit"]
     assert (found.kind, found.field, found.value, found.unit) == ("unit", "load.mass", 0.11, "kg")
     assert found.message in answer.warnings
-    assert "is it in kg?" in found.message
+    assert "is it in kg, or in t?" in found.message
 
 
 def test_a_known_stance_tells_it_of_each_wrench():

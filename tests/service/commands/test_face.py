@@ -235,3 +235,30 @@ def test_a_study_shows_how_far_it_is(tmp_path):
     assert "fig06" in told
     assert "%" in told
     assert on_a_terminal(["-q", *words], stream="stderr") == ""
+
+
+def test_numbers_in_doubt_are_named_even_where_less_is_said(stance_file, capfd):
+    request = put(wall_request(), ("body_wrench",), [1.09, 0, 0, 0, -0.144, 0])
+    request.pop("load", None)
+    path = stance_file(request)
+    for command in ("plan", "body-space"):
+        assert run_command_line([command, path, "-q"]) == DONE
+        out, error = capfd.readouterr()
+        (line,) = error.splitlines()
+        assert line.startswith("crux: warning: body_wrench: it holds up 1.09 N")
+        assert "warning" not in out
+        # with tables all warnings are among these, once
+        assert run_command_line([command, path]) == DONE
+        out, error = capfd.readouterr()
+        assert "".join(out.split()).count("isitinN,orinkN?") == 1
+        assert "body_wrench" not in error
+
+
+def test_a_stream_names_a_number_in_doubt_once(capfd, monkeypatch):
+    lines = b"[1.09,0,0,0,-0.144,0]\n[1.2,0,0,0,-0.144,0]\n[-1082,0,0,0,144,0]\n"
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(lines)))
+    assert run_command_line(["stream", "wall-300", "-q"]) in {DONE, OVERLOADED}
+    first, other = capfd.readouterr().err.splitlines()
+    assert first.startswith("crux: line 1: warning: body_wrench: it holds up 1.09 N")
+    assert first.endswith("is it in N, or in kN?")
+    assert other.startswith("crux: line 3: warning: body_wrench: a force of 1082 N")
