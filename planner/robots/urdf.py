@@ -272,18 +272,10 @@ def _numbers(
     if len(numbers) != count or not all(abs(number) <= largest for number in numbers):
         wanted = "a number" if count == 1 else f"{count} numbers"
         got = shorten(raw, 100, placeholder=" …")
-        units = {("origin", "xyz"): "m", ("origin", "rpy"): "rad", ("mass", "value"): "kg"}
-        units |= dict.fromkeys((("limit", "lower"), ("limit", "upper")), "rad (sliding: m)")
-        unit = units.get((element.tag, attribute), "")
-        # a number that is too large may be in the unit of those who do not use SI
-        slips = {
-            "m": "; in mm?",
-            "rad": "; in degrees?",
-            "rad (sliding: m)": "; in degrees, or mm?",
-        }
-        slip = slips.get(unit, "") if len(numbers) == count else ""
-        within = f"±{largest:g} {unit}".rstrip()
-        raise InvalidInputError(f"{place} must be {wanted} within {within}, got {got!r}{slip}")
+        units = {"xyz": " m, not in mm", "rpy": " rad, not in degrees", "value": " kg"}
+        units |= dict.fromkeys(("lower", "upper"), " rad, not in degrees (sliding: m)")
+        unit = units.get(attribute if element.tag != "axis" else "", "")
+        raise InvalidInputError(f"{place} must be {wanted} within ±{largest:g}{unit}, got {got!r}")
     return numbers
 
 

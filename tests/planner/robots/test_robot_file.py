@@ -294,12 +294,12 @@ def test_a_limb_may_turn_its_hand_by_angles_or_axes(form):
         (
             'xyz="0.6 0 0"',
             'xyz="600 0 0"',
-            "urdf: joint 'knee': xyz of <origin> must be 3 numbers within .*, got '600 0 0'; in mm",
+            "urdf: joint 'knee': xyz of <origin> must be .* within ±100 m, not in mm, got '600",
         ),
         (
             'upper="2.5"',
             'upper="150"',
-            "urdf: joint 'hip': upper of <limit> must be .*, got '150'; in degrees, or mm",
+            "urdf: joint 'hip': upper of <limit> must be a number within ±100 rad, not in degrees",
         ),
         (
             'xyz="0.6 0 0"',
