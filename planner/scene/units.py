@@ -61,16 +61,10 @@ def force_unit(part: float) -> str | None:
     for unit, newtons, off in (
         ("kN", 1e3, 2.5),
         ("kgf", scene_number("usual", "standard_gravity"), 1.25),
-        # no decimal power separates it from a part of the weight
-        ("lbf", _pound_force(), 1.0 + SCENE_SETTINGS.unit_factor),
     ):
         if 1.0 / off <= part * newtons <= off:
             return unit
     return None
-
-
-def _pound_force() -> float:
-    return scene_number("usual", "standard_gravity") * scene_number("usual", "pound")
 
 
 def _mass_unit(part: float) -> str | None:

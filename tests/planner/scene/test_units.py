@@ -95,7 +95,6 @@ WRONG = {
     "body wrench in kN": (wrench(1e-3), "body_wrench"),
     "body wrench in kgf": (wrench(1.0 / 9.80665), "body_wrench"),
     "body wrench in kgf, with a payload": (wrench(1.2 / 9.81), "body_wrench"),
-    "body wrench in lbf": (wrench(1.0 / 4.44822), "body_wrench"),
     "body wrench in kN, half hung": (wrench(0.6e-3), "body_wrench"),
     "body wrench in kN, loaded": (wrench(2.0e-3), "body_wrench"),
     "body wrench in mN": (wrench(1e3), "body_wrench"),
