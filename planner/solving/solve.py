@@ -373,8 +373,7 @@ def with_advice(question: Question, answer: Plan) -> Plan:
     """Return a plan with advice added: changes of the question that would help.
 
     If the deadline cuts the search off, ``advice`` is added to the unfinished results, with a
-    warning. No advice is searched for while a finding doubts a number; a warning names
-    the number.
+    warning. No advice is searched for while a finding doubts a number, which a warning names.
 
     Parameters
     ----------
@@ -383,8 +382,7 @@ def with_advice(question: Question, answer: Plan) -> Plan:
         The question's plan.
     """
     start = time.perf_counter()
-    odd = [each.field for each in answer.findings if each.doubts_number]
-    if odd:
+    if odd := [each.field for each in answer.findings if each.doubts_number]:
         warning = f"no search for advice while a number is in doubt: {', '.join(odd)}"
         return replace(answer, advice=(), warnings=(*answer.warnings, warning))
     found, whole = advise(question, try_stance)
