@@ -33,7 +33,10 @@ LONG = (
     *("test_robust_load_factor.py", "test_search_benchmarks.py", "test_plain_opening.py"),
     *("test_climb.py", "test_calibrate.py", "test_reliability.py", "test_random_plans.py"),
     *("test_many_questions.py", "test_reply_sizes.py", "test_open_loop.py", "test_spread.py"),
-    *("test_dispatcher.py", "test_service.py", "test_cli.py", "test_ways_of_asking.py"),
+    *("test_seats_on_walls.py", "test_field_names.py", "test_benchmark_table.py"),
+    *("test_compliant_plan.py", "test_contact_rest.py", "test_detail.py", "test_survival.py"),
+    *("test_ways_of_asking.py", "test_route.py", "test_network.py", "test_cli.py"),
+    *("test_dispatcher.py", "test_service.py", "test_com_region.py", "test_less_tension.py"),
 )
 """Files whose tests take longest together, which one process each goes through."""
 
