@@ -25,6 +25,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -255,5 +256,15 @@ def _nodes(spread: float) -> tuple[Array, Array]:
     """Return nodes and weights of quadrature over the logarithm of a factor of mean 1."""
     if spread == 0.0:
         return np.zeros(1), np.ones(1)
-    nodes, weights = np.polynomial.hermite_e.hermegauss(STRENGTH_SETTINGS.nodes)
-    return spread * nodes - 0.5 * spread**2, weights / weights.sum()
+    nodes, weights = _normal_nodes(STRENGTH_SETTINGS.nodes)
+    return spread * nodes - 0.5 * spread**2, weights
+
+
+@cache
+def _normal_nodes(count: int) -> tuple[Array, Array]:
+    """Return nodes and weights of quadrature over a normal number of mean 0 and deviation 1."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(count)
+    weights /= weights.sum()
+    for each in (nodes, weights):
+        each.setflags(write=False)
+    return nodes, weights
