@@ -174,7 +174,7 @@ function annotationsOf(scene) { // texts over the scene: as meshes they take a s
   const said = (p, text, more) => ({ x: p[0], y: p[1], z: p[2], text: plain(short(text)), showarrow: false, font: { color: ink("ink"), size: 12 }, ...more });
   const arrows = shownKinds["forces of hands"] ? scene.arrows : [];
   return [...scene.labels.map((l) => said(l.place, l.text, { yshift: -14 })), ...arrows.map((a) => said(a.tip, a.text.split("\n")[0], { yshift: 12 })),
-    ...(chosen()?.moves ?? []).map((m) => said(middle(m.to ?? m.from), m.text, { yshift: 28, font: { color: ink("advice"), size: 13 }, bgcolor: ink("panel") }))];
+    ...(chosen()?.moves ?? []).map((m) => said(middle(m.to ?? m.from), m.text, { yshift: -34, font: { color: ink("advice"), size: 13 }, bgcolor: ink("panel") }))];
 }
 
 function drawScene(view) {
@@ -309,6 +309,7 @@ async function show(view) {
   const stage = data.stages[at];
   showWords(stage);
   await drawScene(view);
+  await new Promise((go) => setTimeout(go)); // the picture first
   if (stage !== data.stages[at]) return; // another was asked for meanwhile
   if (data.stages.length > 1) {
     byId("stage").value = at;
