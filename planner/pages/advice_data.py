@@ -59,7 +59,7 @@ def _difference(plan: Plan, question: Question, advice: Advice) -> dict[str, Any
     moves = []
     for limb in dict.fromkeys([*places[0], *places[1]]):
         start, end = (each.get(limb) for each in places)
-        if start != end or limb in advice.limbs:
+        if start != end or limb != "B":
             used = (_said(hands.get(limb)) for hands in (old, new))
             words = "B" if limb == "B" else f"{limb.replace('_', ' ')} {' → '.join(used)}"
             moves.append({"from": start, "to": end, "text": words})

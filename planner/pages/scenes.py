@@ -82,7 +82,7 @@ class Meshes:
             try:
                 found = link_meshes(robot)
             except InvalidInputError as error:
-                self.said.append(f"Capsules stand for the links, whose meshes lack: {error}")
+                self.said.append(f"Capsules stand for the links: {error}")
                 found = []
             drawn = {each.file: each.triangles for each in found}
             cell, most = 0.0, PICTURE_SETTINGS.robot_triangles

@@ -59,7 +59,8 @@ def link_meshes(robot: Robot) -> list[LinkMesh]:
             robot.model, text, pin.GeometryType.VISUAL, package_dirs=above
         )
     except (ValueError, RuntimeError) as error:
-        raise InvalidInputError(" ".join(str(error).split()), field="urdf") from None
+        said = " ".join(str(error).split()).rpartition("message: ")[2].partition(" Hint: ")[0]
+        raise InvalidInputError(f"a mesh cannot be read: {said}", field="urdf") from None
     return list(_meshes(robot, found.geometryObjects))
 
 

@@ -191,7 +191,9 @@ def test_an_advice_is_drawn_from_where_things_are_to_where_they_would_be(tmp_pat
     write_plan_page(advised, question, tmp_path / "plan.html", "a wall")
     ((found,),) = (s["advice"] for s in data_of((tmp_path / "plan.html").read_text())["stages"])
     assert (found["sentence"], found["utilisation"], found["holds"]) == ("<b>move</b>", 0.5, True)
-    palm, body = found["moves"]
+    palm, *others, body = found["moves"]
+    assert all(each["from"] == each["to"] for each in others)
+    assert len(others) == len(plan.hands) - 1
     np.testing.assert_allclose(np.subtract(palm["to"], palm["from"]), [step] * 4, atol=2e-4)
     np.testing.assert_allclose(np.mean(palm["from"], axis=0), hand.pose.position, atol=2e-4)
     np.testing.assert_allclose(body["from"], [stance.body.position], atol=2e-4)
