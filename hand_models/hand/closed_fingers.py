@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, RefusedPlaceError
+from hand_models.base import Array, InvalidInputError, RefusedPlaceError, go_on
 from hand_models.finger import (
     CONTACT_KINDS,
     JOINT_STOPS,
@@ -235,6 +235,7 @@ def _alone(
     sides: dict[Hashable, float] = {}
     closed: dict[Hashable, ClosedFinger | Refused] = {}
     for k in left:
+        go_on()
         i, finger = divmod(k, len(FINGERS))
         placement, cuts = placed.placements[i], placed.cuts(i)
         if placement.grasp.fingernail:

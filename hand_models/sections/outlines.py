@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import BASE_TOLERANCES, Array
+from hand_models.base import BASE_TOLERANCES, Array, go_on
 from hand_models.sections.finger_rock import FingerRock
 from hand_models.sections.section import Complexes, Flags, Section
 from hand_models.sections.settings import SECTION_SETTINGS
@@ -64,10 +64,11 @@ class Outlines(NamedTuple):
             Largest distance between neighbouring points [m].
         """
         block = SECTION_SETTINGS.points_per_circle
-        taken = [
-            (_points(rock.tile, reach, spacing), _standing_out(rock, reach, spacing))
-            for rock in rocks
-        ]
+        taken = []
+        for rock in rocks:
+            go_on()
+            under = _points(rock.tile, reach, spacing)
+            taken.append((under, _standing_out(rock, reach, spacing)))
         blocks = math.ceil(max([1, *(len(a[0]) + len(b[0]) for a, b in taken)]) / block)
         # what stands for no rock is 1 km away, and next to nothing long
         points = np.full((len(taken), blocks * block), complex(1e3))

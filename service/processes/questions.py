@@ -76,7 +76,7 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
     from service.answering import Streams, handle, robots_of
 
     # a single plan loads these only when it needs them
-    scipy = ("linalg", "optimize", "spatial", "stats")
+    scipy = ("linalg", "optimize", "signal", "spatial", "stats")
     for name in ("cvxpy", *(f"scipy.{part}" for part in scipy), "trimesh"):
         import_module(name)
     load_closing()

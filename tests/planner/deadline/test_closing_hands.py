@@ -6,11 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from hand_models.base import broken_off_by, go_on
+from hand_models.base import Pose, broken_off_by, go_on
 from hand_models.fixed_wrist import best_seats
 from hand_models.hand import Placement, SpinyHand
-from hand_models.rock import Mesh
+from hand_models.hand.placement import PlacedHands
+from hand_models.rock import Mesh, Sphere
+from hand_models.sections import FingerRock
 from planner import deadline
 from planner.deadline import DeadlineError
 from planner.solving import plan
@@ -46,6 +49,31 @@ def test_closing_is_broken_off_and_begun_again(wall: Mesh) -> None:
     whole = hand.settle(wall, ROCK, PINCH)
     again = SpinyHand(HAND.table).settle(wall, ROCK, PINCH)
     np.testing.assert_array_equal(whole.positions, again.positions)
+
+
+def test_no_two_fingers_are_laid_on_rock_without_a_look_at_the_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    hand, ball, rocks = SpinyHand(HAND.table), Sphere(0.4), []
+    cut = PlacedHands.rock
+
+    def counted(placed: PlacedHands, i: int, finger: int) -> FingerRock:
+        rocks.append(1)
+        return cut(placed, i, finger)
+
+    monkeypatch.setattr(PlacedHands, "rock", counted)
+    turned = Rotation.from_euler("xyz", [[0.01 * k, 0.02, 0.3] for k in range(6)]).as_matrix()
+    poses = [Pose(np.array([0.01, 0.0, 0.03]), turn) for turn in turned]
+    between: list[int] = []
+
+    def check() -> None:
+        between.append(len(rocks))
+        rocks.clear()
+
+    with broken_off_by(check):
+        hand.settle_each([Placement(ball, ROCK, PINCH, pose) for pose in poses])
+    assert sum(between) + len(rocks) >= len(poses)
+    assert max(between) <= 1
 
 
 def test_what_is_asked_inside_counts_inside_alone() -> None:
