@@ -152,6 +152,17 @@ def test_a_published_wrench_has_the_set_points_of_a_query(client: CruxClient) ->
         assert received(stream, 1).set_points.hands[0].wrench is msgspec.UNSET
 
 
+def test_a_published_wrench_in_kilonewtons_is_doubted(client: CruxClient) -> None:
+    with client.publish_stream(declaration()) as stream:
+        assert stream.declared.findings == []
+        points = received(stream, stream.publish([1.09, 0, 0, 0, -0.144, 0])).set_points
+        (found,) = points.findings
+        assert (found.kind, found.field, found.value) == ("unit", "body_wrench", 1.09)
+        assert "or in kN?" in found.message
+        points = received(stream, stream.publish([1090, 0, 0, 0, -144, 0])).set_points
+        assert points.findings is msgspec.UNSET
+
+
 def test_a_slip_that_is_published_is_answered_at_the_same_key(client: CruxClient) -> None:
     with client.publish_stream(declaration()) as stream:
         wrench = np.multiply(0.9, stream.declared.body_wrench)
