@@ -154,8 +154,8 @@ class Scan:
         Raises
         ------
         InvalidInputError
-            If the side is ambiguous, or the viewpoint is assumed and too far away for a scanner;
-            the field is ``view``.
+            If the side is ambiguous, or the viewpoint is assumed and too far away, too near or too
+            far to the side for a scanner; the field is ``view``.
         """
         if self.view is not None:
             return self.view
@@ -168,10 +168,11 @@ class Scan:
             self._check_origin(bulk)
         normal = np.asarray(np.linalg.eigh(np.cov((bulk - middle).T))[1][:, 0])
         depth = (bulk - self.viewpoint) @ normal
-        if depth.min() > 0.0:
-            return normal
-        if depth.max() < 0.0:
-            return -normal
+        if depth.min() > 0.0 or depth.max() < 0.0:
+            side = np.sign(depth.mean())
+            if self.assumed:
+                self._check_place(bulk, side * normal)
+            return np.asarray(side * normal)
         # rock whose normal is that steep is taken to be ground, seen from above
         if abs(normal[2]) >= 0.7:
             return np.asarray(-normal * np.sign(normal[2]))
@@ -217,6 +218,25 @@ class Scan:
                 "the direction in which the scanner looked, or --viewpoint",
                 field="view",
             )
+
+    def _check_place(self, bulk: Array, view: Array) -> None:
+        """Refuse the file's origin as the scanner's place if it looks like one of rock's own."""
+        middle = bulk.mean(axis=0) - self.viewpoint
+        depth, away = float(middle @ view), float(np.linalg.norm(middle))
+        size = float(np.ptp(bulk, axis=0).max())
+        table = scan_table()
+        nearest, least = table.scalar("scan", "nearest_scanner"), table.scalar("scan", "closest")
+        # rock that is met from above is ground, on whichever of its sides the axes begin
+        if view[2] <= -0.7 or depth >= max(nearest * max(size, away), least):
+            return
+        raise InvalidInputError(
+            "the scanner's position is unknown: the file has none, and the file's origin is "
+            f"{depth:.2g} m before or behind rock of {size:.3g} m"
+            + (f", and {away:.3g} m from its middle" if away > 2.0 * depth else "")
+            + " (was an offset subtracted?): give --view X,Y,Z, the direction in which the "
+            "scanner looked, or --viewpoint",
+            field="view",
+        )
 
 
 def axes_along(view: Array) -> Array:
