@@ -225,7 +225,10 @@ class Scan:
         depth, away = float(middle @ view), float(np.linalg.norm(middle))
         size = float(np.ptp(bulk, axis=0).max())
         table = scan_table()
-        nearest, least = table.scalar("scan", "nearest_scanner"), table.scalar("scan", "closest")
+        nearest = table.scalar("scan", "nearest_scanner")
+        # smaller rock is in another unit, which is warned of
+        small = size < SCAN_SETTINGS.smallest_rock
+        least = 0.0 if small else table.scalar("scan", "closest")
         # rock that is met from above is ground, on whichever of its sides the axes begin
         if view[2] <= -0.7 or depth >= max(nearest * max(size, away), least):
             return

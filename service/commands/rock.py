@@ -84,7 +84,7 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     callback=_triple,
     metavar="X,Y,Z",
     help="In place of a view: where the scanner was, in the file's axes and unit; by default what "
-    "a PCD file says, else the file's origin, unless that is too far away.",
+    "a PCD file says, else the file's origin, unless that is too far away or too near.",
 )
 @click.option(
     "--origin",
@@ -337,7 +337,9 @@ def _print_rock(
     view = ", ".join(f"{size:z.2f}" for size in made.pose.rotation[:, 2])
     whence = "z up"
     if _assumed(scan):
-        whence += ", assumed: " + ("from the file's origin" if scan.faces is None else "from above")
+        before = (scan.points.mean(axis=0) - scan.viewpoint) @ made.pose.rotation[:, 2]
+        origin = f"from the file's origin, {before:.2g} m before the rock"
+        whence += ", assumed: " + (origin if scan.faces is None else "from above")
     rows = [
         ("points read", f"{made.read:,}", ""),
         ("dropped", f"{made.dropped:,}", "not finite, or several at (0, 0, 0)"),

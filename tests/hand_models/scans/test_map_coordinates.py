@@ -50,6 +50,32 @@ def test_an_origin_from_which_rock_is_seen_is_where_the_scanner_was(away, tmp_pa
     assert scan.direction()[1] > 0.99
 
 
+@pytest.mark.parametrize(
+    "place",
+    [
+        (0.0, 0.25, 0.0),  # behind a wall that is 0.8 m wide and high
+        (0.3, 0.35, 0.0),
+        (0.4, -0.3, -0.4),  # before it, but nearer than half its width
+        (1.8, -0.6, 0.0),  # far to the side
+        (0.0, -1.5, 3.0),
+    ],
+)
+def test_an_origin_that_an_offset_left_near_the_rock_is_not_where_a_scanner_was(place, tmp_path):
+    path = text_of(tmp_path, wall(0.02, half=0.4) - [0.0, 1.0, 0.0] - place)
+    with pytest.raises(InvalidInputError, match=r"offset.*--view X,Y,Z.*--viewpoint") as error:
+        read_scan(path).direction()
+    assert error.value.field == "view"
+    assert read_scan(path, view=(0, 1, 0)).direction().tolist() == [0, 1, 0]
+
+
+def test_rock_is_small_or_large_by_how_far_a_scanner_stands_from_it(tmp_path):
+    small = text_of(tmp_path, wall(0.01) - [0.0, 0.8, 0.0])
+    with pytest.raises(InvalidInputError, match=r"0\.2 m before or behind rock of 0\.24 m"):
+        read_scan(small).direction()
+    large = text_of(tmp_path, wall(0.02, half=0.4) - [0.2, 0.5, 0.2])
+    assert read_scan(large).direction()[1] > 0.99
+
+
 @pytest.mark.parametrize("offset", [o for o in OFFSETS if max(map(abs, o)) > 2e4])
 @pytest.mark.parametrize("ending", [".xyz", ".ply", ".pcd", ".csv"])
 def test_floats_of_32_bits_do_not_hold_map_coordinates(offset, ending, tmp_path):
