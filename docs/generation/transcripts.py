@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import queue
 import re
 from collections.abc import Mapping
 from importlib import resources
@@ -13,7 +14,7 @@ import zenoh
 
 from generation.messages import anchor
 from service.serving import PlanService, open_session, zenoh_config
-from service.wire import most_bytes, schema, service_key
+from service.wire import most_bytes, schema, service_key, stream_key
 from service.wire.json_schema import MESSAGE_KINDS
 
 __all__ = ["key_pages"]
@@ -28,8 +29,22 @@ WIDEST: Final = 100
 
 ENCODINGS: Final = {"json": "application/json", "msgpack": "application/msgpack"}
 
-TIMEOUT: Final = 60.0
+TIMEOUT: Final = 300.0
 """Of a question, of which the first waits for processes that start [s]."""
+
+PUBLISHED: Final = "stream_wrench"
+"""Name of the page of wrenches that are published on a stream."""
+
+CLIMB_ASKED: Final = {
+    "v": 1,
+    "id": "a",
+    "rock": "leaning-wall",
+    "start": {"height": 0.9},
+    "goal": {"height": 1.4},
+    "places": {"spacing": 0.8},
+    "time": 5.0,
+    "deadline": 120.0,
+}
 
 KINDS: Final = {kind.__name__: kind for kind in MESSAGE_KINDS}
 
@@ -56,10 +71,13 @@ def key_pages() -> dict[str, bytes]:
     with open_session(config) as session, PlanService(session, workers=1):
         for key in _keys():
             _add_page(session, key, pages)
+        _add_published(session, pages)
         pages["keys/errors.md"] = _errors(session).encode()
         pages["keys/health.md"] = _plain(session, "health", HEALTH).encode()
         pages["keys/metrics.md"] = _plain(session, "metrics", METRICS).encode()
-    names = [*(key.name for key in _keys()), "health", "metrics", "errors"]
+    pages["keys/play.md"] = _published_at("play", PLAY).encode()
+    asked = [key.name for key in _keys()]
+    names = [*asked, PUBLISHED, "play", "health", "metrics", "errors"]
     pages["keys/index.md"] = BEGINNING.format("\n".join(names)).encode()
     return pages
 
@@ -87,7 +105,17 @@ def _keys() -> tuple[_Key, ...]:
                 "detail": "set_points",
             },
         ),
+        _Key("diagnosis", DIAGNOSIS, asked | {"tensions": {"front_right": [63, 91, 85, 63]}}),
+        _Key("route", ROUTE, asked | {"moves": [_move(stance["hands"][0])], "explain": False}),
+        _Key("climb", CLIMB, CLIMB_ASKED),
+        _Key("cancel", CANCEL, {"v": 1, "id": "a"}),
     )
+
+
+def _move(hand: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a move of a hand to the same hold 100 mm higher up."""
+    x, y, z = hand["pose"]["position"]
+    return {**hand, "pose": {**hand["pose"], "position": [x, y, round(z + 0.1, 6)]}}
 
 
 def _add_page(session: zenoh.Session, key: _Key, pages: dict[str, bytes]) -> None:
@@ -100,12 +128,12 @@ def _add_page(session: zenoh.Session, key: _Key, pages: dict[str, bytes]) -> Non
     exchange = schema()["keys"][named]
     request = _name(exchange["request"])
     replies = exchange["reply"].get("anyOf", [exchange["reply"]])
-    told_as = " or ".join(f"[{_name(reply)}](#{anchor(_name(reply))})" for reply in replies)
+    told_as = " or ".join(_link(_name(reply)) for reply in replies)
     text = [
         f"# {key.name}\n",
         f"{key.words}\n",
         f"- Key: `{named}`",
-        f"- Request: [{request}](#{anchor(request)}), {most_bytes(KINDS[request]):,} bytes at most",
+        f"- Request: {_link(request)}, {most_bytes(KINDS[request]):,} bytes at most",
         f"- Reply: {told_as}",
         "",
     ]
@@ -115,20 +143,60 @@ def _add_page(session: zenoh.Session, key: _Key, pages: dict[str, bytes]) -> Non
         told = _ask(session, key.name, asked, encoding)
         if not told.good:
             raise RuntimeError(f"{key.name}: {told.payload.decode()}")
-        text.append(f"## {'JSON' if form == 'json' else 'MessagePack'}\n")
-        kept = "" if form == "json" else ":class: bytes\n"  # a style that does not wrap lines
-        for part, payload, coded in (
-            ("request", asked, encoding),
-            ("reply", told.payload, told.encoding),
-        ):
-            name = f"bytes/{key.name}-{part}.{form}"
-            pages[name] = payload
-            text += [
-                f"The {part}, {len(payload):,} bytes, encoding `{coded}`"
-                f" ({{download}}`download <../{name}>`):\n",
-                f"```{{code-block}} text\n{kept}{_shown(payload, form)}\n```\n",
-            ]
+        both = {"request": _Told(asked, encoding, True), "reply": told}
+        text += _payloads(key.name, form, both, pages)
     pages[f"keys/{key.name}.md"] = "\n".join(text).encode()
+
+
+def _add_published(session: zenoh.Session, pages: dict[str, bytes]) -> None:
+    """Add the page of a wrench that is published, and of the set-points that answer it."""
+    stream = json.loads(pages["bytes/stream-reply.json"])["stream"]
+    example = {"v": 1, "number": 0, "time": 12.5, "body_wrench": [1090, 0, 0, 0, -144, 0]}
+    text = [_published_at("stream/<stream>/wrench", WRENCH, title=PUBLISHED)]
+    text.append(_published_at("stream/<stream>/set_points", "", title=""))
+    answers: queue.Queue[zenoh.Sample] = queue.Queue()
+    with session.declare_subscriber(stream_key(ROBOT, stream, "set_points"), answers.put):
+        for form, encoding in ENCODINGS.items():
+            coder = msgspec.json if form == "json" else msgspec.msgpack
+            asked = coder.encode(example | {"detail": "set_points"})
+            session.put(stream_key(ROBOT, stream, "wrench"), asked, encoding=encoding)
+            sample = answers.get(timeout=TIMEOUT)
+            both = {
+                "wrench": _Told(asked, encoding, True),
+                "set_points": _Told(bytes(sample.payload), str(sample.encoding), True),
+            }
+            text += _payloads(PUBLISHED, form, both, pages)
+    pages[f"keys/{PUBLISHED}.md"] = "\n".join(text).encode()
+
+
+def _published_at(name: str, words: str, title: str | None = None) -> str:
+    """Return what a page says of a key where messages are published."""
+    named = service_key("<robot>", name)
+    message = _name(schema()["keys"][named]["published"])
+    head = name if title is None else title
+    begin = [f"# {head}\n", f"{words}\n"] if head else []
+    return "\n".join([*begin, f"- Key: `{named}`", f"- Published: {_link(message)}", ""])
+
+
+def _link(message: str) -> str:
+    return f"[{message}](#{anchor(message)})"
+
+
+def _payloads(
+    key: str, form: str, parts: Mapping[str, _Told], pages: dict[str, bytes]
+) -> list[str]:
+    """Add the payloads in one format to the files; return what the key's page shows of them."""
+    text = [f"## {'JSON' if form == 'json' else 'MessagePack'}\n"]
+    kept = "" if form == "json" else ":class: bytes\n"  # a style that does not wrap lines
+    for part, told in parts.items():
+        name = f"bytes/{key}-{part}.{form}"
+        pages[name] = told.payload
+        text += [
+            f"The {part}, {len(told.payload):,} bytes, encoding `{told.encoding}`"
+            f" ({{download}}`download <../{name}>`):\n",
+            f"```{{code-block}} text\n{kept}{_shown(told.payload, form)}\n```\n",
+        ]
+    return text
 
 
 def _name(reference: Mapping[str, str]) -> str:
@@ -182,8 +250,9 @@ def _shown(payload: bytes, form: str) -> str:
 
 BEGINNING = """# Keys of the service
 
-The service answers zenoh queries at the keys below. These pages are enough to write a client in any
-language that has zenoh.
+The service answers zenoh queries at the keys below. On a stream, wrenches may also be
+[published](stream_wrench.md). These pages are enough to write a client in any language that has
+zenoh.
 
 A question is one `get` on the key `crux/<robot>/<name>`, with the request as its payload and its
 encoding. The reply is one sample on that key.
@@ -230,6 +299,26 @@ the 16 streams that were used last are kept."""
 
 SET_POINTS = """Gives the set-points of a stream for one body wrench. The stream was declared with
 [stream](stream.md)."""
+
+DIAGNOSIS = """Tells which tile has probably slipped, by the tensions, currents or turns of the
+motors after the slip."""
+
+ROUTE = """Plans every stage of a climb. With `"want": ["trajectory"]` and `"parts": true`, the
+knots of each move come first, as [PartReply](#message-partreply) messages on the same key. The
+example moves one hand 100 mm up."""
+
+CLIMB = """Searches for the best climb on a rock, with a bound of every other. With
+`"parts": true`, progress comes first, as [PartReply](#message-partreply) messages on the same key.
+The example ends after 5 s."""
+
+CANCEL = """Ends questions of the same client that wait, and its searches for climbs. Questions are
+named by their `id`; the reply counts them. Here none waited."""
+
+WRENCH = """Body wrenches may be published on a stream that was declared with [stream](stream.md).
+The service publishes set-points for the newest of them, with its `number` and `time`, or an
+`error` in their place. [Feed a control loop](../../../how-to/set-points.md) tells more."""
+
+PLAY = """`crux play` publishes the set-points of a climb here, for a robot. Nobody answers."""
 
 HEALTH = """Reports the state for an operator: version, uptime, workers, the queue, the last
 failure."""

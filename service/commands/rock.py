@@ -188,7 +188,7 @@ def _summary(made: scans.ScannedRock) -> dict[str, Any]:
         "dropped": made.dropped,
         "outliers": made.outliers,
         "alone": made.alone,
-        "kept": made.kept,
+        "triangles_kept": made.kept,
         "vertices": len(made.vertices),
         "triangles": len(made.faces),
         "spacing": made.spacing,

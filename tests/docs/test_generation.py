@@ -56,7 +56,10 @@ def test_the_bytes_of_the_keys_are_messages():
     pages = import_module("generation.transcripts").key_pages()
     whole = schema()
     payloads = {name: content for name, content in pages.items() if name.startswith("bytes/")}
-    assert len(payloads) == 5 * 2 * 2
+    # a request and a reply, in two formats, of each key where queries or wrenches get answers
+    assert len(payloads) == 10 * 2 * 2
+    told = "\n".join(content.decode() for name, content in pages.items() if "keys/" in name)
+    assert all(f"- Key: `{key}`\n" in told for key in whole["keys"])
     for name, content in payloads.items():
         if name.endswith(".json"):
             message = json.loads(content)
