@@ -85,7 +85,7 @@ def plan_command(
         request = msgspec.structs.replace(request, want=[w for w in request.want if w != "advice"])
     begun = perf_counter()
     with tables.waiting(f"planning {stance}", request):
-        if request.deadline is not None:
+        if request.deadline is not None or _needs_closing(request):
             from hand_models.hand import load_closing
 
             # the first process of a machine compiles, for longer than most deadlines
@@ -177,6 +177,12 @@ def _print(
         tables.print_redundancy(answer.reply.redundancy, tables.console(), holds=whole)
     tables.tell_solver(answer.reply)
     sys.stdout.flush()
+
+
+def _needs_closing(request: PlanRequest) -> bool:
+    """Return True if hands are on rock that compiled code cuts and closes fingers on."""
+    rock = requests.Profile, requests.Mesh, requests.RockReference
+    return any(isinstance(hand.hold, rock) for hand in request.stance.hands)
 
 
 def _holds(answer: answering.Planned) -> bool:

@@ -10,6 +10,7 @@ import click
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table
     from rich.text import Text
 
 __all__ = [
@@ -260,9 +261,34 @@ def print_rows(
     widest = out.measure(table, options=out.options.update(max_width=1000)).maximum
     if widest > out.width and not any(column.kind == "text" for column in columns):
         table.padding = (0, padding, 0, 0)
+    _part_heads_between_words(table, columns, out)
     out.print(table)
     for line in legend:
         out.print(line)
+
+
+def _part_heads_between_words(table: Table, columns: Sequence[PrintedColumn], out: Console) -> None:
+    """Part the heads of a table that is too wide between their words, if it then has room."""
+
+    def too_wide() -> bool:
+        wide = out.options.update(max_width=1000)
+        return out.measure(table, options=wide).maximum > out.width
+
+    if not too_wide() or any(column.kind == "text" for column in columns):
+        return
+    for shown, column in zip(table.columns, columns, strict=True):
+        parted = column.head.split() if column.kind == "number" else [column.head]
+        cells = (out.measure(cell).maximum for cell in shown.cells)
+        shown.width = max(*cells, *map(len, parted), 0)
+    if too_wide():
+        for shown in table.columns:
+            shown.width = None
+        return
+    for shown, column in zip(table.columns, columns, strict=True):
+        narrow = shown.width or 0
+        shown.width = max(narrow, len(column.head))
+        if too_wide():
+            shown.width = narrow
 
 
 def _print_lines(rows: Iterable[Any], columns: Sequence[PrintedColumn], out: Console) -> None:

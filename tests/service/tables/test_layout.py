@@ -85,3 +85,14 @@ def test_numbers_of_things_read_well_for_none_and_one():
     said = [counted(count, "body", "bodies") for count in (0, 1, 2, 1200)]
     assert said == ["no bodies", "1 body", "2 bodies", "1,200 bodies"]
     assert [counted(count, "move") for count in (1, 3)] == ["1 move", "3 moves"]
+
+
+@pytest.mark.parametrize(("width", "whole"), [(28, True), (27, False)])
+def test_heads_are_parted_between_words_where_there_is_room(width: int, whole: bool) -> None:
+    out = Console(file=io.StringIO(), width=width)
+    columns = in_order(["hand"], ["support N", "share %"])
+    print_rows([("front_left", 1.0, 2.0)], columns, out)
+    lines = out.file.getvalue().splitlines()
+    assert any("support" in line for line in lines) is whole
+    # no cell is cut, whatever becomes of the heads
+    assert any("front_left" in line for line in lines)
