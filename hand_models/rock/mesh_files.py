@@ -156,6 +156,8 @@ def _check_stl(content: bytes, path: Path) -> None:
     named = int.from_bytes(content[80:head], "little")
     if len(content) >= head + one * named and len(content) > head:
         return  # binary, whatever its head says
+    if content[:5] == b"solid" and b"facet" not in content and b"endsolid" in content:
+        return  # a text that is whole, without triangles
     if b"facet" in content[:1000]:
         if b"endsolid" not in content[-1000:]:
             raise InvalidInputError(f"the text has no endsolid, cut short: {path}; export it again")
