@@ -231,6 +231,7 @@ def stand_in(close: Callable[[], None] = lambda: None) -> SimpleNamespace:
         limbs=(),
         columns=(),
         interpolates=None,
+        findings=(),
         question=SimpleNamespace(stance=SimpleNamespace(hands=())),
         set_points=lambda *_: SetPoints("failed", wrench, verified=False, reason="none"),
         close=close,
