@@ -34,7 +34,7 @@ class WrenchCheck:
         gravity = float(np.linalg.norm(stance.gravity))
         mass = robot.mass if load.mass is None else load.mass
         mass += sum(each.mass for each in load.payloads)
-        self._weight, self._reach = mass * gravity, robot.reach
+        self._mass, self._weight, self._reach = mass, mass * gravity, robot.reach
         self._on_earth = robot.mass * scene_number("usual", "standard_gravity")
         up = stance.body.rotation.T @ -stance.gravity / (gravity or 1.0)
         self._up: tuple[float, ...] = tuple(up.tolist())
@@ -73,8 +73,12 @@ class WrenchCheck:
         if up > 0.94 and (unit := force_unit(part)) is not None:
             message = f"it holds up {force:.3g} N, the robot weighs {self._weight:.4g} N"
             return [_unit(f"{message}: is it in N, or in {unit}?", force, "N")]
-        angle = math.acos(max(-1.0, min(up, 1.0)))
-        if angle < SCENE_SETTINGS.off_up or not 1.0 / about <= part <= about:
+        up = max(-1.0, min(up, 1.0))
+        angle = math.acos(up)
+        # acceleration of the body that would need it, if nothing else pulled there
+        needed = self._weight / self._mass * math.hypot(part - up, math.sqrt(1.0 - up * up))
+        sharp = angle >= SCENE_SETTINGS.off_up and needed >= SCENE_SETTINGS.sharpest
+        if not (sharp and 1.0 / about <= part <= about):
             return []
         message = (
             f"body_wrench: a force of {force:.4g} N, about the robot's weight of "

@@ -31,6 +31,9 @@ class SceneSettings:
     """Factor within which a force is about the robot's weight, so that it is likely to hold it."""
     off_up: float = math.radians(60.0)
     """Angle to up from which on a force about the weight is odd: pulls turn it less [rad]."""
+    sharpest: float = 5.0
+    """Acceleration of a body that would need such a force, from which on it is odd [m/s²]: where
+    gravity is small, climbers have larger ones than it."""
     least_payload: float = 1e-4
     """Part of the robot's mass below which a payload changes nothing, so that it may be in t."""
     widest: float = 20.0

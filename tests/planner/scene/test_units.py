@@ -215,6 +215,11 @@ def turned_off(asked, angle, size=1.0):
 def test_a_weight_that_is_not_held_up_is_doubted():
     for base in BASES:
         asked = Question(BASES[base]())
+        if np.linalg.norm(asked.stance.gravity) < 5.0:
+            # on the Moon a body that moves needs as much, to whichever side
+            moon = Question(with_gravity(asked.stance, 1.62))
+            assert wrench_findings(replace(moon, body_wrench=-needed(moon))) == ()
+            continue
         own, turn = needed(asked), asked.stance.body.rotation
         in_world = np.concatenate([turn @ own[:3], turn @ own[3:]])
         gravity = -own
