@@ -309,7 +309,7 @@ example moves one hand 100 mm up."""
 
 CLIMB = """Searches for the best climb on a rock, with a bound of every other. With
 `"parts": true`, progress comes first, as [PartReply](#message-partreply) messages on the same key.
-Of the example, the search may take 5 s; its grid of placements is so coarse that it has no climb."""
+In the example, the grid of placements is so coarse that there is no climb."""
 
 CANCEL = """Ends questions of the same client that wait, and its searches for climbs. Questions are
 named by their `id`; the reply counts them. Here none waited."""

@@ -230,7 +230,7 @@ def _check_digits(points: Array, scale: float, path: Path) -> None:
     too_few = InvalidInputError(
         f"coordinates up to {largest:,.0f} are in steps of {single:g} {_of_unit(scale)}, as "
         "floats of 32 bits are at that size: subtract an offset (shift to a local origin) "
-        f"before the export, or export 64-bit floats (double): {path}",
+        f"before the export, and then give --view, or export 64-bit floats (double): {path}",
         field="file",
     )
     if scale * single > coarsest and np.array_equal(points, points.astype(np.float32)):
@@ -253,7 +253,8 @@ def _check_digits(points: Array, scale: float, path: Path) -> None:
             raise InvalidInputError(
                 f"coordinates up to {largest:,.0f} have {digits} digits, steps of {step:g} "
                 f"{_of_unit(scale)}, and {len(points):,} points are at {distinct:,} places: "
-                f"write more digits, or subtract an offset before the export: {path}",
+                "write more digits, or subtract an offset before the export, and then give "
+                f"--view: {path}",
                 field="file",
             )
 

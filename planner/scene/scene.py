@@ -26,7 +26,7 @@ class SceneSettings:
     in_thousandths: float = 100.0
     """Multiple of it from which on it is taken for one in thousandths, such as g or N·mm."""
     unit_factor: float = 0.01
-    """How near, as a part, a number must be to one in a unit that no power of ten tells from it."""
+    """How near, as a part, a number must be to one in a unit that a power of ten does not show."""
     about_weight: float = 1.5
     """Factor within which a force is about the robot's weight, so that it is likely to hold it."""
     off_up: float = math.radians(60.0)

@@ -305,6 +305,7 @@ def demo_command(
 
         asked = own.asked(climbs.demo_request())
         return search_climb(asked, folder, options.WorkersOption(None, None), own, as_json, page)
+    tables.write_alone(picture)
     request = options.with_extras(own.asked(stances.read_request("wall-300-joints")))
     serving.start_zenoh_log()
     config = serving.zenoh_config(settings=["listen/endpoints:[]"], multicast=False)

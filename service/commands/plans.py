@@ -179,7 +179,7 @@ def _print(
     sys.stdout.flush()
 
 
-def _needs_closing(request: PlanRequest) -> bool:
+def _needs_closing(request: requests.PlanRequest) -> bool:
     """Return True if hands are on rock that compiled code cuts and closes fingers on."""
     rock = requests.Profile, requests.Mesh, requests.RockReference
     return any(isinstance(hand.hold, rock) for hand in request.stance.hands)

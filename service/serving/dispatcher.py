@@ -291,11 +291,7 @@ class Dispatcher:
     def _give(self, lane: PriorityLane[Job, Answer], question: PendingQuestion) -> None:
         question.begun = time.perf_counter()
         self._pool.work[lane] = question
-        rehearsal = question.name == ServiceName.STREAM and not question.rehearsed
-        job = question.job(question.begun, rehearsal)
-        if question.name == ServiceName.STREAM:
-            job = job._replace(connected=self._names.connected())
-        lane.give(job)
+        lane.give(question.job(question.begun, self._names.connected))
 
     def _drop(self, client: str, token: bool) -> None:
         names = self._names

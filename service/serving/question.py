@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -127,15 +128,16 @@ class PendingQuestion:
         """Return an error as an encoded answer, in the question's format and with its ``id``."""
         return encode_error(error, self.form, self.id, most=self.most)
 
-    def job(self, now: float, rehearsal: bool) -> Job:
+    def job(self, now: float, connected: Callable[[], frozenset[str]]) -> Job:
         """Return the question as a job for a worker; of a stream's wrenches, with the newest.
 
         Parameters
         ----------
         now : float
             Present time on the clock of `time.perf_counter` [s].
-        rehearsal : bool
-            True if the worker must release a stream again that it has declared.
+        connected : callable
+            Returns the clients that are connected; called for a declaration of a stream, which the
+            worker must release again unless it is ``rehearsed``.
         """
         stream = None
         if isinstance(self.query, PublishedWrench):
@@ -143,9 +145,17 @@ class PendingQuestion:
             self.payload, self.encoding = newest.payload.to_bytes(), str(newest.encoding)
             self.arrived = self.query.arrived
         waited = now - self.arrived
-        encoding, seconds = self.encoding, self.seconds
+        declares = self.name == ServiceName.STREAM
         return Job(
-            self.name, self.payload, encoding, waited, seconds, rehearsal, self.place, stream
+            self.name,
+            self.payload,
+            self.encoding,
+            waited,
+            self.seconds,
+            declares and not self.rehearsed,
+            self.place,
+            stream,
+            connected() if declares else None,
         )
 
 

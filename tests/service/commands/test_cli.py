@@ -419,6 +419,7 @@ def test_a_wrench_space_where_the_hand_is_a_little_elsewhere(stance_file, capfd)
     out = capfd.readouterr().out
     assert max(len(line) for line in out.splitlines()) <= 80
     assert "at 8 places within 2 mm and 20 mrad" in out
+    assert out.count("a row's least may be above its most") == 1
     assert run_command_line([*arguments, "--json"]) == DONE
     assert f"{-result(capfd)['robust']['hundredth']['-fx']:.2f}" in out
 
