@@ -27,8 +27,9 @@ def compiled(*arguments: str | np.dtype[Any]) -> Callable[[Function], Function]:
     *arguments : str or numpy.dtype
         For each argument ``f`` (float), ``c`` (complex), ``i`` (int) or ``b`` (bool), then the
         number of its dimensions, 0 for a number. Such an array is contiguous, row by row, and is
-        not written to. A dtype stands for an array of its records, which may be written to. A
-        function without ``arguments`` can only be called by compiled functions of its own module.
+        not written to. Several of these with blanks between stand for a tuple. A dtype stands for
+        an array of its records, which may be written to. A function without ``arguments`` can only
+        be called by compiled functions of its own module.
     """
     import numba
 
@@ -56,6 +57,9 @@ def _type(argument: str | np.dtype[Any]) -> Any:
 
     if not isinstance(argument, str):
         return numba.types.Array(numba.from_dtype(argument), 1, "C")
+    if " " in argument:
+        several: Any = numba.types.Tuple
+        return several([_type(each) for each in argument.split()])
     kinds = {"f": numba.float64, "c": numba.complex128, "i": numba.intp, "b": numba.bool_}
     kind, dimensions = kinds[argument[0]], int(argument[1:])
     return numba.types.Array(kind, dimensions, "C", readonly=True) if dimensions else kind

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any, Final
 
 import numpy as np
 
@@ -10,15 +11,20 @@ from hand_models.base import Array, Indices, compiled
 
 __all__ = ["follow_pose", "joint_frames", "solve_poses"]
 
+LimbConstants = tuple[Any, ...]
+"""`LimbChain.constants`: of a limb of k joints, of which n are driven."""
+
+LIMB_TYPES: Final = "f3 f2 f2 f2 f2 f1 f2 f1 f1 f0"
+"""Their types, as of `compiled`."""
+
 
 @compiled()
-def _joint_frames(chain: tuple[Array, ...], angles: Array, frames: Array, along: Array) -> None:
+def _joint_frames(chain: LimbConstants, angles: Array, frames: Array, along: Array) -> None:
     """Write axes and origins (k, 3, 4) of all joints in B, and where each moves to, (k, 3).
 
-    ``along`` is the axis of a joint that turns, or the direction of one that slides; ``chain`` are
-    the attributes of `LimbChain` from turns to offset, angles (n,).
+    ``along`` is the axis of a joint that turns, or the direction of one that slides; angles (n,).
     """
-    turns, shifts, axes, slides, coupling, offset = chain
+    turns, shifts, axes, slides, coupling, offset = chain[:6]
     R, M, T, p = np.eye(3), np.empty((3, 3)), np.empty((3, 3)), np.zeros(3)
     for i in range(len(coupling)):
         q = offset[i]
@@ -61,21 +67,10 @@ def _hand_frame(last: Array, hand: Array, found: Array) -> None:
             found[a, c] = total
 
 
-@compiled("f3", "f2", "f2", "f2", "f2", "f1", "f2")
-def joint_frames(
-    turns: Array,
-    shifts: Array,
-    axes: Array,
-    slides: Array,
-    coupling: Array,
-    offset: Array,
-    angles: Array,
-) -> Array:
-    """Return axes and origins (S, k, 3, 4) of all joints in B at joint angles (S, n).
-
-    The other parameters are the attributes of `LimbChain`.
-    """
-    k, chain = len(coupling), (turns, shifts, axes, slides, coupling, offset)
+@compiled(LIMB_TYPES, "f2")
+def joint_frames(chain: LimbConstants, angles: Array) -> Array:
+    """Return axes and origins (S, k, 3, 4) of all joints in B at joint angles (S, n)."""
+    k = len(chain[0])
     along, found = np.empty((k, 3)), np.empty((len(angles), k, 3, 4))
     for s in range(len(angles)):
         _joint_frames(chain, angles[s], found[s], along)
@@ -150,11 +145,9 @@ def _hand_error(at: Array, target: Array, reach: float, error: Array) -> None:
 
 
 @compiled()
-def _hand_jacobian(
-    chain: tuple[Array, ...], frames: Array, along: Array, at: Array, reach: float, J: Array
-) -> None:
+def _hand_jacobian(chain: LimbConstants, frames: Array, along: Array, at: Array, J: Array) -> None:
     """Write the Jacobian (6, n) of a hand in H, lengths over the reach; see `_joint_frames`."""
-    slides, coupling = chain[3], chain[4]
+    slides, coupling, reach = chain[3], chain[4], chain[9]
     J[:] = 0.0
     for i in range(len(frames)):
         u, v, w = along[i]
@@ -176,24 +169,26 @@ def _hand_jacobian(
 
 
 @compiled()
-def _squared(J: Array, weights: Array, A: Array) -> None:
-    """Write J diag(weights) Jᵀ plus 1e-12, (6, 6): a stretched limb's is singular."""
+def _squared(J: Array, free: Array, damping: float, A: Array) -> None:
+    """Write the lower part of J diag(free) Jᵀ + damping, (6, 6); ``free`` is 1, or 0 if stuck."""
     for a in range(6):
-        for b in range(6):
-            A[a, b] = 1e-12 if a == b else 0.0
+        for b in range(a + 1):
+            total = 0.0
             for j in range(J.shape[1]):
-                A[a, b] += J[a, j] * weights[j] * J[b, j]
+                total += J[a, j] * free[j] * J[b, j]
+            A[a, b] = total
+        A[a, a] += damping
 
 
 @compiled()
-def _least_step(J: Array, free: Array, error: Array, A: Array, step: Array) -> None:
-    """Write the least step (n,) of free joints by which a hand's error is least; A is overwritten.
+def _least_step(J: Array, free: Array, error: Array, damping: float, A: Array, step: Array) -> None:
+    """Write the damped least step (n,) of free joints to a hand's twist (6,); A is overwritten.
 
-    With w the free joints' ones and others' zeros, and damping ε = 10⁻¹², the step
-    diag(w) Jᵀ (J diag(w) Jᵀ + ε)⁻¹ error is that of (diag(w) Jᵀ J + ε)⁻¹ diag(w) Jᵀ, too.
+    With w the joints that are free, that is diag(w) Jᵀ (J diag(w) Jᵀ + damping)⁻¹ error. Where
+    joints are too few to reach the twist, the error that they leave is the least.
     """
     inner = error.copy()
-    _squared(J, free, A)
+    _squared(J, free, damping, A)
     _solve(A, inner)
     for j in range(J.shape[1]):
         step[j] = 0.0
@@ -201,22 +196,9 @@ def _least_step(J: Array, free: Array, error: Array, A: Array, step: Array) -> N
             step[j] += free[j] * J[a, j] * inner[a]
 
 
-@compiled("f3", "f2", "f2", "f2", "f2", "f1", "f2", "f1", "f1", "f0", "f2", "f1", "f1", "i0")
+@compiled(LIMB_TYPES, "f2", "f1", "f1", "i0")
 def follow_pose(
-    turns: Array,
-    shifts: Array,
-    axes: Array,
-    slides: Array,
-    coupling: Array,
-    offset: Array,
-    hand: Array,
-    lower: Array,
-    upper: Array,
-    reach: float,
-    target: Array,
-    start: Array,
-    numbers: Array,
-    steps: int,
+    chain: LimbConstants, target: Array, start: Array, numbers: Array, steps: int
 ) -> tuple[Array, bool]:
     """Return angles near others that put a limb's hand on a pose (n,), and whether there are any.
 
@@ -227,19 +209,19 @@ def follow_pose(
 
     Parameters
     ----------
-    turns, shifts, axes, slides, coupling, offset, hand, lower, upper, reach
-        Attributes of `LimbChain`.
+    chain
+        `LimbChain.constants`.
     target : ndarray, shape (3, 4)
         Axes and origin of the pose of H in B.
     start : ndarray, shape (n,)
         Joint angles to start from.
-    numbers : ndarray, shape (3,)
-        Of `MotionSettings`: pose_error, largest_step, slope_step.
+    numbers : ndarray, shape (4,)
+        Of `MotionSettings`: pose_error, largest_step, slope_step, least_damping.
     steps : int
         Steps at most.
     """
-    (k, n), chain = coupling.shape, (turns, shifts, axes, slides, coupling, offset)
-    near, largest, h = numbers
+    (k, n), (hand, lower, upper, reach) = chain[4].shape, chain[6:]
+    near, largest, h, least_damping = numbers
     frames, along = np.empty((k, 3, 4)), np.empty((k, 3))
     at, error = np.empty((3, 4)), np.empty(6)
     J, A, free, step = np.empty((6, n)), np.empty((6, 6)), np.empty(n), np.empty(n)
@@ -250,10 +232,10 @@ def follow_pose(
         _hand_error(at, target, reach, error)
         if np.abs(error).max() <= near:
             return angles, True
-        _hand_jacobian(chain, frames, along, at, reach, J)
+        _hand_jacobian(chain, frames, along, at, J)
         free[:] = 1.0
         for _ in range(n):
-            _least_step(J, free, error, A, step)
+            _least_step(J, free, error, least_damping, A, step)
             stuck = False
             for j in range(n):
                 # a joint at a limit that it would leave stays there
@@ -277,8 +259,8 @@ def follow_pose(
                     ends_at = start + (2 * side - 1) * h * kernel[m]
                     _joint_frames(chain, ends_at, frames, along)
                     _hand_frame(frames[k - 1], hand, at)
-                    _hand_jacobian(chain, frames, along, at, reach, J)
-                    _squared(J, free, A)
+                    _hand_jacobian(chain, frames, along, at, J)
+                    _squared(J, free, least_damping, A)
                     _factored(A)
                     ends[side] = 0.0
                     for a in range(6):
@@ -292,30 +274,16 @@ def follow_pose(
     return angles, False
 
 
-@compiled("f3", "f2", "f2", "f2", "f2", "f1", "f2", "f1", "f1", "f0", "f3", "f3", "f1", "i0", "i0")
+@compiled(LIMB_TYPES, "f3", "f3", "f1", "i0", "i0")
 def solve_poses(
-    turns: Array,
-    shifts: Array,
-    axes: Array,
-    slides: Array,
-    coupling: Array,
-    offset: Array,
-    hand: Array,
-    lower: Array,
-    upper: Array,
-    reach: float,
-    targets: Array,
-    starts: Array,
-    numbers: Array,
-    steps: int,
-    branches: int,
+    chain: LimbConstants, targets: Array, starts: Array, numbers: Array, steps: int, branches: int
 ) -> tuple[Array, Indices]:
     """Return joint angles that put a limb's hand on each of N poses, from several starts each.
 
     Parameters
     ----------
-    turns, shifts, axes, slides, coupling, offset, hand, lower, upper, reach
-        Attributes of `LimbChain`.
+    chain
+        `LimbChain.constants`.
     targets : ndarray, shape (N, 3, 4)
         Axes and origins of the poses of H in B.
     starts : ndarray, shape (N, S, n)
@@ -333,14 +301,14 @@ def solve_poses(
     found : ndarray of int, shape (N,)
         Number of solutions of each pose.
     """
-    (k, n), chain = coupling.shape, (turns, shifts, axes, slides, coupling, offset)
+    (k, n), (hand, lower, upper, reach) = chain[4].shape, chain[6:]
     near, damping, least_damping, longest, alike, early = numbers
     found = np.zeros(len(targets), dtype=np.intp)
     angles = np.zeros((len(targets), branches, n))
     frames, along = np.empty((k, 3, 4)), np.empty((k, 3))
-    at, error, inner = np.empty((3, 4)), np.empty(6), np.empty(6)
+    at, error = np.empty((3, 4)), np.empty(6)
     J, A = np.empty((6, n)), np.empty((6, 6))
-    x, step = np.empty(n), np.empty(n)
+    x, free, step = np.empty(n), np.empty(n), np.empty(n)
     for t in range(len(targets)):
         for s in range(starts.shape[1]):
             if found[t] >= branches:
@@ -360,29 +328,17 @@ def solve_poses(
                 if solved or turn == steps or (turn >= early and size > 0.5 * before):
                     break
                 before = size
-                _hand_jacobian(chain, frames, along, at, reach, J)
+                _hand_jacobian(chain, frames, along, at, J)
                 for j in range(n):
                     slope = 0.0
                     for a in range(6):
                         slope += J[a, j] * error[a]
                     # a joint at a limit that the step would exceed stays there
-                    if (x[j] <= lower[j] and slope < 0.0) or (x[j] >= upper[j] and slope > 0.0):
-                        for a in range(6):
-                            J[a, j] = 0.0
-                for a in range(6):
-                    inner[a] = error[a]
-                    for b in range(a + 1):
-                        total = 0.0
-                        for j in range(n):
-                            total += J[a, j] * J[b, j]
-                        A[a, b] = total
-                    A[a, a] += damping * square + least_damping
-                _solve(A, inner)
+                    low, high = x[j] <= lower[j] and slope < 0.0, x[j] >= upper[j] and slope > 0.0
+                    free[j] = 0.0 if low or high else 1.0
+                _least_step(J, free, error, damping * square + least_damping, A, step)
                 farthest = longest
                 for j in range(n):
-                    step[j] = 0.0
-                    for a in range(6):
-                        step[j] += J[a, j] * inner[a]
                     farthest = max(farthest, abs(step[j]))
                 for j in range(n):
                     x[j] = min(max(x[j] + step[j] * longest / farthest, lower[j]), upper[j])

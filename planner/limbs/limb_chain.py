@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -83,6 +83,11 @@ class LimbChain(NamedTuple):
             coms=np.array([each.lever for each in inertias]),
         )
 
+    @property
+    def constants(self) -> tuple[Any, ...]:
+        """Attributes that compiled kinematics take: those from turns to upper, and the reach."""
+        return (*self[:9], self.reach)
+
     def frames(self, angles: Array) -> Array:
         """Return axes and origins (S, 3, 4) of H in B at joint angles (S, n)."""
         last = self._joint_frames(angles)[:, -1]
@@ -99,7 +104,7 @@ class LimbChain(NamedTuple):
     def _joint_frames(self, angles: Array) -> Array:
         from planner.limbs.compiled_kinematics import joint_frames
 
-        return joint_frames(*self[:6], np.ascontiguousarray(angles))
+        return joint_frames(self.constants, np.ascontiguousarray(angles))
 
     def follow(self, target: Pose, start: Array, numbers: Array, steps: int) -> Array | None:
         """Return angles near others (n,) that put H on a pose in B [rad]; None without any.
@@ -108,8 +113,8 @@ class LimbChain(NamedTuple):
         """
         from planner.limbs.compiled_kinematics import follow_pose
 
-        asked = _axes_and_origin(target), start, numbers, steps
-        angles, found = follow_pose(*self[:9], self.reach, *asked)
+        at = np.column_stack([target.rotation, target.position])
+        angles, found = follow_pose(self.constants, at, start, numbers, steps)
         return angles if found else None
 
     def solve(
@@ -121,15 +126,10 @@ class LimbChain(NamedTuple):
         """
         from planner.limbs.compiled_kinematics import solve_poses
 
-        return solve_poses(*self[:9], self.reach, targets, starts, numbers, steps, branches)
+        return solve_poses(self.constants, targets, starts, numbers, steps, branches)
 
     def spans(self, targets: Array) -> Array:
         """Return how far poses of H in B (N, 3, 4) are from the shoulder, over the reach, (N,)."""
         links = targets[:, :, :3] @ self.lever + targets[:, :, 3]
         found: Array = np.linalg.norm(links - self.shoulder, axis=1) / self.reach
         return found
-
-
-def _axes_and_origin(pose: Pose) -> Array:
-    """Return a pose as the array (3, 4) of its axes and origin."""
-    return np.column_stack([pose.rotation, pose.position])

@@ -87,7 +87,14 @@ class _Limb:
         settings = MOTION_SETTINGS
         self.limb, self.chain = limb, robot.chains[limb]
         self._robot, self._compiled = robot, LimbChain.of(robot, limb)
-        self._numbers = np.array([settings.pose_error, settings.largest_step, settings.slope_step])
+        self._numbers = np.array(
+            [
+                settings.pose_error,
+                settings.largest_step,
+                settings.slope_step,
+                settings.least_damping,
+            ]
+        )
 
     def follow(self, start: Array, pose: Pose) -> Array | None:
         """Return angles near others that solve a pose of H in B; None if none are near enough."""

@@ -21,6 +21,8 @@ class MotionSettings:
     """Error of a pose that is followed, of the limb's reach [1] or [rad]."""
     slope_step: float = 1e-4
     """Difference quotient's step of how well a limb moves every way [rad]."""
+    least_damping: float = 1e-12
+    """Damping of a step, over the squares of reach and turn [1]: a stretched limb's is singular."""
     missed: float = 1e-6
     """Error of a pose beyond which a limb of few joints misses it, of its reach [1] or [rad]."""
     at_limit: float = 1e-3

@@ -48,7 +48,7 @@ def test_centres_of_mass_are_those_of_pinocchio(make):
 @pytest.mark.parametrize("make", ROBOTS.values(), ids=ROBOTS)
 def test_a_hand_follows_to_a_pose_nearby(make):
     """The pose is that of Pinocchio, its angles are within limits, and no joint turns far."""
-    robot, numbers = make(), np.array([1e-11, 0.2, 1e-4])
+    robot, numbers = make(), np.array([1e-11, 0.2, 1e-4, 1e-12])
     for limb in robot.limbs:
         chain = LimbChain.of(robot, limb)
         for q in random_angles(chain, 10):
