@@ -6,9 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.fixed_wrist import FINGER_TWIST
@@ -73,7 +74,12 @@ def limit_unit(limit: str) -> str:
 
 def most_used(used: Array) -> int:
     """Return the index of the largest utilisation, of alike ones the first: no rounding decides."""
-    return int((used >= used.max() - 10.0**-TOLERANCES.ranking_digits).argmax())
+    return int(_alike(used).argmax())
+
+
+def _alike(values: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return which values are the largest, but for rounding."""
+    return np.asarray(values >= np.maximum.reduce(values) - 10.0**-TOLERANCES.ranking_digits)
 
 
 def limit_name(limb: str, row: Row) -> LimitName:
@@ -221,11 +227,7 @@ class ActiveLimits:
             return most
         limits, shares = self._of_row.take(rows), used.take(rows)
         worth = self._worth.take(limits)
-        dear = (
-            (worth >= np.maximum.reduce(worth) - 10.0**-TOLERANCES.ranking_digits)
-            .nonzero()[0]
-            .tolist()
-        )
+        dear = _alike(worth).nonzero()[0].tolist()
         tied = set(limits.take(dear).tolist())
         if len(tied) > 1:
             first = max(map(self._rank, tied))
