@@ -11,7 +11,7 @@ from planner.question import Question
 from planner.result import Finding
 from planner.robots import scene_number
 from planner.scene.scene import SCENE_SETTINGS
-from planner.scene.units import force_unit, robot_findings
+from planner.scene.units import force_unit, robot_findings, unit_finding
 
 __all__ = ["WrenchCheck", "wrench_findings"]
 
@@ -56,14 +56,16 @@ class WrenchCheck:
         found = []
         if force > SCENE_SETTINGS.in_thousandths * on_earth:
             message = f"a force of {force:.3g} N is {force / on_earth:.3g} times the robot's weight"
-            found.append(_unit(f"{message} on the Earth: is it in N?", force, "N"))
+            found.append(
+                unit_finding("body_wrench", f"{message} on the Earth: is it in N?", force, "N")
+            )
         elif self._weight and force and force != 1.0:
             up = self._up
             found += self._of_weight(force, (up[0] * fx + up[1] * fy + up[2] * fz) / force)
         if moment > SCENE_SETTINGS.widest * self._reach * lever:
             message = f"a moment of {moment:.3g} N·m is that of {lever:.4g} N at"
             message += f" {moment / lever:.3g} m: is it in N·m?"
-            found.append(_unit(message, moment, "N·m"))
+            found.append(unit_finding("body_wrench", message, moment, "N·m"))
         return tuple(found)
 
     def _of_weight(self, force: float, up: float) -> list[Finding]:
@@ -72,7 +74,9 @@ class WrenchCheck:
         # within 20° of up it holds the robot's weight
         if up > 0.94 and (unit := force_unit(part)) is not None:
             message = f"it holds up {force:.3g} N, the robot weighs {self._weight:.4g} N"
-            return [_unit(f"{message}: is it in N, or in {unit}?", force, "N")]
+            return [
+                unit_finding("body_wrench", f"{message}: is it in N, or in {unit}?", force, "N")
+            ]
         up = max(-1.0, min(up, 1.0))
         angle = math.acos(up)
         # acceleration of the body that would need it, if nothing else pulled there
@@ -86,10 +90,6 @@ class WrenchCheck:
             "W, and what the rock exerts on the robot, not gravity itself?"
         )
         return [Finding("wrench_not_up", "body_wrench", message, angle, "rad")]
-
-
-def _unit(message: str, value: float, unit: str) -> Finding:
-    return Finding("unit", "body_wrench", f"body_wrench: {message}", value, unit)
 
 
 def wrench_findings(question: Question) -> tuple[Finding, ...]:

@@ -21,7 +21,7 @@ from planner.result import Finding
 from planner.robots import Robot, scene_number
 from planner.scene.scene import SCENE_SETTINGS
 
-__all__ = ["force_unit", "robot_findings", "unit_findings"]
+__all__ = ["force_unit", "robot_findings", "unit_finding", "unit_findings"]
 
 
 def unit_findings(question: Question) -> tuple[Finding, ...]:
@@ -46,7 +46,7 @@ def unit_findings(question: Question) -> tuple[Finding, ...]:
     return found if robot else (*found, *_load(question), *_holds(stance), *_joints(question))
 
 
-def _finding(field: str, message: str, value: float, unit: str, whose: str = "") -> Finding:
+def unit_finding(field: str, message: str, value: float, unit: str, whose: str = "") -> Finding:
     """Return a finding whose message begins with whose number it is: a limb's, else the field's."""
     return Finding("unit", field, f"{whose or field}: {message}", value, unit)
 
@@ -86,13 +86,9 @@ def _load(question: Question) -> Iterator[Finding]:
         if unit := _mass_unit(part):
             message = f"{load.mass:.4g} kg are {part:.3g} times the robot's {robot.mass:.4g} kg"
             message += f": is it in kg, or in {unit}?"
-            yield _finding("load.mass", message, load.mass, "kg")
+            yield unit_finding("load.mass", message, load.mass, "kg")
         if not SCENE_SETTINGS.in_thousands < part < SCENE_SETTINGS.in_thousandths:
-            message = (
-                f"{load.mass:.4g} kg are {part:.2g} times what the robot weighs, {robot.mass:.4g} "
-                f"kg: is it in kg, or in {'t' if part < 1.0 else 'g'}?"
-            )
-            yield _finding("load.mass", message, load.mass, "kg")
+            yield _odd_mass("load.mass", load.mass, robot)
     if load.com is not None:
         away = math.hypot(*load.com)
         if away > farthest:
@@ -100,23 +96,19 @@ def _load(question: Question) -> Iterator[Finding]:
                 f"it is {away:.3g} m from the body's origin, and limbs reach {robot.reach:.2g} m: "
                 "is it in m, in B?"
             )
-            yield _finding("load.com", message, away, "m")
+            yield unit_finding("load.com", message, away, "m")
     for i, payload in enumerate(load.payloads):
         field, part = f"load.payloads[{i}]", payload.mass / robot.mass
         # 10 kg in g are far more than five robots
         if part > 5.0 or part < SCENE_SETTINGS.least_payload:
-            message = (
-                f"{payload.mass:.4g} kg are {part:.2g} times what the robot weighs, "
-                f"{robot.mass:.4g} kg: is it in kg, or in {'g' if part > 1.0 else 't'}?"
-            )
-            yield _finding(f"{field}.mass", message, payload.mass, "kg")
+            yield _odd_mass(f"{field}.mass", payload.mass, robot)
         away = math.hypot(*payload.com)
         if away > farthest:
             message = (
                 f"it is {away:.3g} m from the origin of what carries it, and limbs reach "
                 f"{robot.reach:.2g} m: is it in m, in that frame?"
             )
-            yield _finding(f"{field}.com", message, away, "m")
+            yield unit_finding(f"{field}.com", message, away, "m")
     most = scene_number("usual", "strongest_gravity")
     for name, arm, unit in (
         ("acceleration", 1.0, "m/s²"),
@@ -125,17 +117,27 @@ def _load(question: Question) -> Iterator[Finding]:
         size = math.hypot(*getattr(load, name))
         if size * arm > most:
             message = f"{size:.3g} {unit} is more than a robot is moved with: is it in {unit}?"
-            yield _finding(f"load.{name}", message, size, unit)
+            yield unit_finding(f"load.{name}", message, size, unit)
+
+
+def _odd_mass(field: str, mass: float, robot: Robot) -> Finding:
+    """Return the finding of a mass that is far from the robot's."""
+    part = mass / robot.mass
+    message = (
+        f"{mass:.4g} kg are {part:.2g} times what the robot weighs, {robot.mass:.4g} kg: is it in "
+        f"kg, or in {'t' if part < 1.0 else 'g'}?"
+    )
+    return unit_finding(field, message, mass, "kg")
 
 
 def _gravity(stance: Stance) -> Iterator[Finding]:
     size, most = float(np.linalg.norm(stance.gravity)), scene_number("usual", "strongest_gravity")
     if abs(size - 1.0) <= 0.02:  # [m/s²]: in g, all but 1
         message = f"it is {size:.3g} m/s², as on no body that is climbed: is it in m/s², or in g?"
-        yield _finding("stance.gravity", message, size, "m/s²")
+        yield unit_finding("stance.gravity", message, size, "m/s²")
     elif size > most:
         message = f"{size:.4g} m/s² is more than on any planet: is it in m/s²?"
-        yield _finding("stance.gravity", message, size, "m/s²")
+        yield unit_finding("stance.gravity", message, size, "m/s²")
 
 
 def robot_findings(robot: Robot) -> Iterator[Finding]:
@@ -149,19 +151,19 @@ def robot_findings(robot: Robot) -> Iterator[Finding]:
             f"the robot's limbs reach {robot.reach:.3g} m, and a palm is {hand.palm_length:.2g} m "
             "long: are the lengths of its URDF in m?"
         )
-        yield _finding(field, message, robot.reach, "m")
+        yield unit_finding(field, message, robot.reach, "m")
     elif robot.mass > stone:
         message = (
             f"the robot weighs {robot.mass:.6g} kg, more than a ball of rock as far as its limbs "
             f"reach, {robot.reach:.2g} m: are the masses of its URDF in kg?"
         )
-        yield _finding(field, message, robot.mass, "kg")
+        yield unit_finding(field, message, robot.mass, "kg")
     elif links < 0.2 * hand.mass:
         message = (
             f"the robot's links weigh {links:.3g} kg together, one hand {hand.mass:.3g} kg: are "
             "the masses of its URDF in kg?"
         )
-        yield _finding(field, message, links, "kg")
+        yield unit_finding(field, message, links, "kg")
 
 
 # What holds ---------------------------------------------------------------------------------------
@@ -180,7 +182,7 @@ def _surfaces(stance: Stance) -> Iterator[Finding]:
             f"{weakest:.3g} to {strongest:.3g} N: is it {slip}?"
         )
         field = f"stance.hands[{i}].surface.shear_limit"
-        yield _finding(field, message, strength, "N", hand.limb)
+        yield unit_finding(field, message, strength, "N", hand.limb)
 
 
 def _presets() -> tuple[float, float]:
@@ -198,7 +200,7 @@ def _holds(stance: Stance) -> Iterator[Finding]:
                 f"the hold's {name} is {size:.3g} m, and limbs reach "
                 f"{stance.robot.reach:.2g} m: is it in m?"
             )
-            yield _finding(f"stance.hands[{i}].hold.{name}", message, size, "m", hand.limb)
+            yield unit_finding(f"stance.hands[{i}].hold.{name}", message, size, "m", hand.limb)
 
 
 def _width(hold: Hold) -> tuple[str, float]:
@@ -220,12 +222,14 @@ def _tensions(question: Question) -> Iterator[Finding]:
     cap = question.limits.tendon_tension
     if cap is not None and cap < nothing * most:
         message = f"{cap:.3g} N is next to nothing of the {most:.4g} N that a tendon holds"
-        yield _finding("limits.tendon_tension", f"{message}: is it in N?", cap, "N")
+        yield unit_finding("limits.tendon_tension", f"{message}: is it in N?", cap, "N")
     for name in ("hold_margin", "palm_margin", "least_tension"):
         least = getattr(question.limits, name)
         if 0.0 < least < SCENE_SETTINGS.in_thousands * closing:
             message = f"{least:.3g} N is next to nothing of the {closing:.3g} N that tendons close"
-            yield _finding(f"limits.{name}", f"{message} with: is it in N, or in kN?", least, "N")
+            yield unit_finding(
+                f"limits.{name}", f"{message} with: is it in N, or in kN?", least, "N"
+            )
     given = [(f"present.{limb}", each) for limb, each in question.present.items()]
     for i, hand in enumerate(stance.hands):
         tension = hand.grasp.closing_tension
@@ -237,7 +241,7 @@ def _tensions(question: Question) -> Iterator[Finding]:
                 "it in N, or in kgf?"
             )
             field = f"stance.hands[{i}].grasp.closing_tension"
-            yield _finding(field, message, tension, "N", hand.limb)
+            yield unit_finding(field, message, tension, "N", hand.limb)
     for field, tensions in given:
         largest = float(np.max(tensions))
         if largest > 2.0 * most or 0.0 < largest < nothing * closing:
@@ -245,7 +249,7 @@ def _tensions(question: Question) -> Iterator[Finding]:
                 f"the largest is {largest:.4g} N, tendons hold {most:.4g} N and close with "
                 f"{closing:.3g} N: are they in N?"
             )
-            yield _finding(field, message, largest, "N")
+            yield unit_finding(field, message, largest, "N")
 
 
 def _caps(question: Question) -> Iterator[Finding]:
@@ -261,7 +265,7 @@ def _caps(question: Question) -> Iterator[Finding]:
                 f"{least:.3g} N is next to nothing of the {held:.3g} N that a hand holds: "
                 "is it in N?"
             )
-            yield _finding(f"limits.per_hand.{limb}.largest_force", message, least, "N", limb)
+            yield unit_finding(f"limits.per_hand.{limb}.largest_force", message, least, "N", limb)
 
 
 def _hand_wrenches(stance: Stance) -> Iterator[Finding]:
@@ -273,7 +277,7 @@ def _hand_wrenches(stance: Stance) -> Iterator[Finding]:
                 f"the largest force that it is to exert is {force:.3g} N, and a hand holds "
                 f"{held:.3g} N: is it in N, or in kN?"
             )
-            yield _finding(f"stance.hands[{i}].wrench", message, force, "N", hand.limb)
+            yield unit_finding(f"stance.hands[{i}].wrench", message, force, "N", hand.limb)
 
 
 def _joints(question: Question) -> Iterator[Finding]:
@@ -297,7 +301,7 @@ def _joints(question: Question) -> Iterator[Finding]:
                 f"its strongest joint is to bear {most:.4g} N·m, and the robot's weight on "
                 f"the Earth at its reach turns with {usual:.3g} N·m: is it in N·m?"
             )
-            yield _finding(field, message, most, "N·m", limb)
+            yield unit_finding(field, message, most, "N·m", limb)
 
 
 def _largest(limits: float | Sequence[float] | Array, sliding: Iterable[bool]) -> float | None:
