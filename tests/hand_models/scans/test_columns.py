@@ -93,25 +93,22 @@ def test_what_is_no_table_of_points_is_refused_with_its_cause(text, words, tmp_p
     assert error.value.field == "file"
 
 
-def test_what_is_empty_is_not_finite(tmp_path):
-    path = tmp_path / "cloud.csv"
-    path.write_text("x;y;z\n1,5;2;3\n4;;6\n5;6;7\n8;9;1\n", encoding="utf-8")
+@pytest.mark.parametrize(
+    ("name", "text", "points"),
+    [
+        (
+            "cloud.csv",
+            "x;y;z\n1,5;2;3\n4;;6\n5;6;7\n8;9;1\n",
+            [[1.5, 2, 3], [5, 6, 7], [8, 9, 1]],
+        ),
+        ("cloud.xyz", "nan nan nan\n1 2 3\n4 5 6\n7 8 1\n", [[1, 2, 3], [4, 5, 6], [7, 8, 1]]),
+        ("cloud.csv", "x,y,z\n,,\n1,2,3\n4,5,6\n7,8,1\n", [[1, 2, 3], [4, 5, 6], [7, 8, 1]]),
+    ],
+    ids=["one cell is empty", "a first line of nan is no names", "all cells of a line are empty"],
+)
+def test_what_is_empty_or_nan_is_a_point_that_is_not_finite(tmp_path, name, text, points):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
     scan = read_scan(path)
-    np.testing.assert_array_equal(scan.points, [[1.5, 2, 3], [5, 6, 7], [8, 9, 1]])
-    assert scan.dropped == 1
-
-
-def test_a_first_line_of_missing_numbers_is_a_point_not_names(tmp_path):
-    path = tmp_path / "cloud.xyz"
-    path.write_text("nan nan nan\n1 2 3\n4 5 6\n7 8 1\n", encoding="utf-8")
-    scan = read_scan(path)
-    np.testing.assert_array_equal(scan.points, [[1, 2, 3], [4, 5, 6], [7, 8, 1]])
-    assert scan.dropped == 1
-
-
-def test_a_line_of_empty_cells_is_a_point_that_is_not_finite(tmp_path):
-    path = tmp_path / "cloud.csv"
-    path.write_text("x,y,z\n,,\n1,2,3\n4,5,6\n7,8,1\n", encoding="utf-8")
-    scan = read_scan(path)
-    np.testing.assert_array_equal(scan.points, [[1, 2, 3], [4, 5, 6], [7, 8, 1]])
+    np.testing.assert_array_equal(scan.points, points)
     assert scan.dropped == 1
