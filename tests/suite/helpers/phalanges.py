@@ -32,10 +32,10 @@ def beside(
     """Return phalanges of one finger beside all of its rock, or beside some of its points each."""
     sides = [values[0] for values in (rock.points, rock.lengths, rock.bare)]
     places = np.broadcast_arrays(joints, u, depth)
-    found = []
+    found, bar = [], shape.record
     for i, where in enumerate(zip(*(each.ravel().tolist() for each in places), strict=True)):
         own = sides if near is None else [values[near[i]] for values in sides]
-        found.append(phalanx_beside(*own, SETTINGS_RECORD, shape.record, *where))
+        found.append(phalanx_beside(*own, SETTINGS_RECORD, bar, *where))
     return Phalanges(*(np.reshape(values, np.shape(u)) for values in zip(*found, strict=True)))
 
 
@@ -48,6 +48,6 @@ def points_near(
 ) -> list[np.ndarray]:
     """Return the points of its rock on which each phalanx of a finger depends."""
     names = ("points", "lengths", "bare", "centres", "radii", "longest")
-    own = [getattr(rock, name)[0] for name in names]
+    own, bar = [getattr(rock, name)[0] for name in names], shape.record
     places = zip(joints.tolist(), u.tolist(), within.tolist(), strict=True)
-    return [near_points(*own, shape.record, *where) for where in places]
+    return [near_points(*own, bar, *where) for where in places]

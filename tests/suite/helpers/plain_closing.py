@@ -96,6 +96,7 @@ class PlainFinger:
         self.stiffness, self.preload = np.array(model.joint_stiffness), model.joint_preload
         self.lower, self.upper = np.array(model.joint_lower), np.array(model.joint_upper)
         self.depth = self.pull * self.closing / (model.tile_centre * model.bed_stiffness)
+        self.last: tuple[np.ndarray, Beside] | None = None
         self.q = np.clip(np.zeros(3), self.lower, self.upper)
         if min(self.beside(self.q).gap) < 0.0:
             self.q = self.lower.copy()
@@ -130,6 +131,12 @@ class PlainFinger:
     # Geometry and forces --------------------------------------------------------------------------
 
     def beside(self, q: np.ndarray) -> Beside:
+        """Where a step ends, the next begins: that is worked out once."""
+        if self.last is None or not np.array_equal(self.last[0], q):
+            self.last = q.copy(), self.beside_rock(q)
+        return self.last[1]
+
+    def beside_rock(self, q: np.ndarray) -> Beside:
         joints, u = fan_out(q, self.shape.end)
         found = phalanges.beside(self.rock, self.shape, joints, u, self.depth)
         share = engaged_share(found.tile_gap, self.shape.travel, self.shape.exponent)
@@ -171,7 +178,7 @@ class PlainFinger:
         self.least = np.where((self.off == 0.0) & ~within, math.inf, self.least)
         # spines hold no longer than rock is within their travel
         self.modes = tuple(np.where(held & ~within, AIR, self.modes).tolist())
-        turned = [self.beside(self.q + TURN * e) for e in np.eye(3)]
+        turned = [self.beside_rock(self.q + TURN * e) for e in np.eye(3)]
         d_gap = np.column_stack([(each.gap - here.gap) / TURN for each in turned])
 
         def whole(beside: Beside, q: np.ndarray) -> np.ndarray:
@@ -239,7 +246,7 @@ class PlainFinger:
                 return
             rows |= modes != AIR
             free = np.array(self.sides) == FREE
-            turned = [self.beside(self.q + TURN * e).gap for e in np.eye(3)]
+            turned = [self.beside_rock(self.q + TURN * e).gap for e in np.eye(3)]
             d_gap = np.column_stack([(gap - here.gap) / TURN for gap in turned])[rows][:, free]
             turn, *_ = np.linalg.lstsq(d_gap, -apart[rows], rcond=1e-6)
             self.q[free] += np.clip(turn, -LARGEST, LARGEST)
