@@ -95,7 +95,8 @@ def first_to_slip(diagnosis: SlipDiagnosis, rng: np.random.Generator) -> int:
 
 @pytest.mark.parametrize("name", ["wall-300", "overhang", "slab", "boulders"])
 @pytest.mark.parametrize("held", [True, False], ids=["held", "kept"])
-def test_a_thousand_slips_are_named(name, held):
+@pytest.mark.parametrize("slips", [150, pytest.param(1000, marks=pytest.mark.slow)])
+def test_slips_are_named(name, held, slips):
     _, answer, diagnosis = diagnosed(name)
     rng, named, first, sizes = np.random.default_rng(1), 0, 0, []
     limbs = [hand.limb for hand in answer.hands]
@@ -103,7 +104,7 @@ def test_a_thousand_slips_are_named(name, held):
     for each in diagnosis.signatures:
         give[each.hand, each.finger] = each.turn_per_newton
     rest = np.array([hand.tensions for hand in answer.hands])
-    for _ in range(1000):
+    for _ in range(slips):
         slipped = diagnosis.signatures[first_to_slip(diagnosis, rng)]
         error = NOISE * rng.normal(size=rest.shape)
         if held:
@@ -118,8 +119,8 @@ def test_a_thousand_slips_are_named(name, held):
         named += slipped.tile in found.suspects
         first += found.tiles[0].tile == slipped.tile
         sizes.append(len(found.suspects))
-    assert named >= 900
-    assert first >= 450
+    assert named >= 0.9 * slips
+    assert first >= 0.45 * slips
     # of the slab's ball, tiles of few spines slip first, whose loads hardly show
     assert np.median(sizes) <= (4 if name != "slab" else 24)
 

@@ -332,6 +332,7 @@ def test_every_field_of_a_question_has_a_variant():
     assert sorted(VARIANTS) == sorted(FIELDS)
 
 
+@pytest.mark.usefixtures("few_places")
 @pytest.mark.parametrize(("name", "i"), [case for case in CASES if case not in TRIVIAL])
 def test_a_question_is_answered_alike_in_every_way(name: str, i: int):
     asked = request_of(name, i)

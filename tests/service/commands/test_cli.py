@@ -120,7 +120,7 @@ def test_a_plan_says_what_is_left_where_the_hands_are_a_little_elsewhere(stance_
 
 
 def test_a_plan_says_how_it_fares_on_displaced_hands(stance_file, capfd):
-    path = stance_file(compliant_request() | {"open_loop": {"samples": 8}, "want": ["open_loop"]})
+    path = stance_file(compliant_request() | {"open_loop": {"samples": 3}, "want": ["open_loop"]})
     run_command_line(["plan", path, "--open-loop", "--json"])
     reply = result(capfd)
     found = reply["open_loop"]
