@@ -8,6 +8,8 @@ import sys
 from base64 import b64decode
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import msgspec
 import numpy as np
@@ -33,7 +35,7 @@ from planner.result import Advice
 from planner.robots import RobotFile, robot_of
 from planner.solving import solve
 from service.answering import route_of
-from service.commands.stances import read_route
+from tests.suite.helpers.climbs import blocked
 from tests.suite.helpers.pictures import answered
 from tests.suite.helpers.robots import TWO_LINK, limbs_toml
 
@@ -42,7 +44,7 @@ MOST_BYTES = 6e6
 
 @cache
 def result():
-    return evaluate(route_of(read_route("six-moves")), 1)
+    return evaluate(route_of(blocked()), 1)
 
 
 def data_of(text):
@@ -50,11 +52,14 @@ def data_of(text):
     return json.loads(found)
 
 
-def shown(name, tmp_path):
+@cache
+def shown(name):
     """A plan by name with its question, and the data of its page."""
     question, plan = answered(name)
-    write_plan_page(plan, question, tmp_path / "plan.html", name)
-    return question, plan, data_of((tmp_path / "plan.html").read_text("utf-8"))
+    with TemporaryDirectory() as folder:
+        page = Path(folder) / "plan.html"
+        write_plan_page(plan, question, page, name)
+        return question, plan, data_of(page.read_text("utf-8"))
 
 
 def unpacked(data, surface):
@@ -64,8 +69,8 @@ def unpacked(data, surface):
 
 
 @pytest.mark.parametrize("name", ["solved", "overloaded", "floating", "nails"])
-def test_tiles_have_the_plans_numbers(name, tmp_path):
-    _, plan, data = shown(name, tmp_path)
+def test_tiles_have_the_plans_numbers(name):
+    _, plan, data = shown(name)
     (stage,) = data["stages"]
     touching = [
         (hand.limb, tile.finger, tile.phalanx, used, *loads)
@@ -82,8 +87,8 @@ def test_tiles_have_the_plans_numbers(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["solved", "ceiling", "two hands"])
-def test_drawn_forces_of_tiles_and_palm_add_up_to_the_hands(name, tmp_path):
-    question, plan, data = shown(name, tmp_path)
+def test_drawn_forces_of_tiles_and_palm_add_up_to_the_hands(name):
+    question, plan, data = shown(name)
     scene = data["stages"][0]["scene"]
     arrows = [arrow for arrow in scene["arrows"] if arrow["kind"] == "force"]
     for hand, planned, arrow in zip(question.stance.hands, plan.hands, arrows, strict=True):
@@ -99,8 +104,8 @@ def test_drawn_forces_of_tiles_and_palm_add_up_to_the_hands(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["solved", "infeasible"])
-def test_surfaces_are_those_of_the_pictures_scene(name, tmp_path):
-    question, plan, data = shown(name, tmp_path)
+def test_surfaces_are_those_of_the_pictures_scene(name):
+    question, plan, data = shown(name)
     scene = drawn_scene(plan, question, fineness=5)
     wanted = [s for s in scene.surfaces if len(s.faces)]
     for drawn, surface in zip(wanted, data["stages"][0]["scene"]["surfaces"], strict=True):
@@ -114,8 +119,8 @@ def test_surfaces_are_those_of_the_pictures_scene(name, tmp_path):
         np.testing.assert_allclose(found, triangles, atol=6e-5)
 
 
-def test_tables_have_the_plans_numbers(tmp_path):
-    _, plan, data = shown("solved", tmp_path)
+def test_tables_have_the_plans_numbers():
+    _, plan, data = shown("solved")
     tables = {table["title"].partition(":")[0]: table for table in data["stages"][0]["tables"]}
     for table in tables.values():
         assert all(len(row) == len(table["columns"].split(",")) for row in table["rows"])
@@ -130,8 +135,8 @@ def test_tables_have_the_plans_numbers(tmp_path):
     assert torques == [torque for limb in limbs for torque in limb]
 
 
-def test_without_balance_a_page_says_what_is_in_the_way(tmp_path):
-    _, plan, data = shown("infeasible", tmp_path)
+def test_without_balance_a_page_says_what_is_in_the_way():
+    _, plan, data = shown("infeasible")
     (stage,) = data["stages"]
     assert stage["scene"]["tiles"] == stage["slices"] == []
     (table,) = stage["tables"]

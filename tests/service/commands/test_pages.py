@@ -2,11 +2,14 @@
 
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from service.commands import options
 from service.commands.cli import run_command_line
+from tests.suite.helpers.climbs import blocked
 from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED, complaint, result
+from tests.suite.helpers.requests import HEAVY, wall_request
 
 
 def test_a_plan_is_written_as_a_page_beside_its_reply(
@@ -18,11 +21,12 @@ def test_a_plan_is_written_as_a_page_beside_its_reply(
 
 
 def test_advice_that_was_asked_for_is_on_the_page(
-    capfd: pytest.CaptureFixture[str], tmp_path: Path
+    stance_file, capfd: pytest.CaptureFixture[str], tmp_path: Path
 ):
     page, folder = tmp_path / "plan.html", tmp_path / "advice"
-    asked = ["plan", "boulders", "--json", "--html", str(page), "--advice", str(folder)]
-    assert run_command_line(asked) == OVERLOADED
+    asked = ["plan", stance_file(wall_request(HEAVY)), "--json"]
+    more = ["--html", str(page), "--advice", str(folder)]
+    assert run_command_line([*asked, *more]) == OVERLOADED
     text = page.read_text("utf-8")
     advice = result(capfd)["advice"]
     assert len(advice) > 3
@@ -30,8 +34,9 @@ def test_advice_that_was_asked_for_is_on_the_page(
 
 
 def test_a_page_of_a_route_needs_no_folder(capfd: pytest.CaptureFixture[str], tmp_path: Path):
-    page = tmp_path / "route.html"
-    assert run_command_line(["route", "six-moves", "--html", str(page), "--json"]) == OVERLOADED
+    page, route = tmp_path / "route.html", tmp_path / "route.json"
+    route.write_bytes(msgspec.json.encode(blocked()))
+    assert run_command_line(["route", str(route), "--html", str(page), "--json"]) == DONE
     found = result(capfd)
     assert found["files"] == {"page": str(page)}
     assert page.read_text("utf-8").count('"sentence":') == found["stages"]
