@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -39,13 +40,16 @@ def test_a_plan_is_printed_and_drawn(tmp_path: Path):
     assert (tmp_path / "plan.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_client_reads_set_points_of_a_wrench_that_drifts(tmp_path: Path):
+@pytest.fixture(scope="module")
+def endpoint() -> Iterator[str]:
     server = Served(free_endpoint(), "--workers", "1")
-    try:
-        lines = run("zenoh_client", tmp_path, server.endpoint).splitlines()
-    finally:
-        server.process.kill()
-        server.process.communicate()
+    yield server.endpoint
+    server.process.kill()
+    server.process.communicate()
+
+
+def test_a_client_reads_set_points_of_a_wrench_that_drifts(endpoint: str, tmp_path: Path):
+    lines = run("zenoh_client", tmp_path, endpoint).splitlines()
     assert lines[0] == "optimal: utilisation 0.96"
     points = [line.split() for line in lines[1:]]
     assert [int(words[0]) for words in points] == list(range(20))
@@ -54,13 +58,8 @@ def test_a_client_reads_set_points_of_a_wrench_that_drifts(tmp_path: Path):
     assert points[5][2:] != points[15][2:]
 
 
-def test_a_robot_stays_on_the_wall_while_tiles_slip(tmp_path: Path):
-    server = Served(free_endpoint(), "--workers", "1")
-    try:
-        lines = run("recover_from_slips", tmp_path, server.endpoint).splitlines()
-    finally:
-        server.process.kill()
-        server.process.communicate()
+def test_a_robot_stays_on_the_wall_while_tiles_slip(endpoint: str, tmp_path: Path):
+    lines = run("recover_from_slips", tmp_path, endpoint).splitlines()
     assert len({line.partition(":")[0] for line in lines}) == len(lines) == 8
     assert all(re.search(r": (holds, utilisation|overloaded, save \w+ first)", x) for x in lines)
     assert "holds" in lines[0]
