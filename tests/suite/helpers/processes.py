@@ -48,11 +48,10 @@ def alive(session: int) -> list[str]:
     for entry in PROC.glob("[0-9]*"):
         try:
             state, _, _, own = (entry / "stat").read_text().rpartition(")")[2].split()[:4]
-            words = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode()
+            if int(own) == session and state != "Z":
+                found.append((entry / "cmdline").read_bytes().replace(b"\0", b" ").decode())
         except (OSError, ValueError):
             continue
-        if int(own) == session and state != "Z":
-            found.append(words)
     return found
 
 
