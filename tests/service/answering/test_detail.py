@@ -115,8 +115,14 @@ def test_set_points_are_small_whatever_the_status() -> None:
 
 def check_small(requests: list[dict]) -> None:
     for request in requests:
-        for form, most in MOST.items():
-            assert len(answered(request, "set_points", form)) < most
+        assert_small(answered(request, "set_points"))
+
+
+def assert_small(payload: bytes) -> None:
+    """In either form."""
+    reply = Format.JSON.decode(payload, BriefPlanReply)
+    for form, most in MOST.items():
+        assert len(form.encode(reply)) < most
 
 
 def test_set_points_of_bundled_stances_are_small() -> None:
@@ -131,14 +137,16 @@ def _bundled(name: str) -> dict:
 @pytest.mark.slow
 def test_set_points_of_the_suites_plans_are_small() -> None:
     asked = [each.request for each in problems() if "plan" in each.ask and not each.slow]
-    sent = [Format.JSON.encode(request) for request in asked]
-    good = [
-        request
-        for request, payload in zip(asked, sent, strict=True)
-        if dispatch.handle(PLAN, payload).good and len(request["stance"]["hands"]) <= 4
+    answers = [
+        dispatch.handle(PLAN, Format.JSON.encode(request | {"detail": "set_points"}))
+        for request in asked
+        if len(request["stance"]["hands"]) <= 4
     ]
+    good = [answer.payload for answer in answers if answer.good]
     assert len(good) > 200
-    check_small([*good, _bundled("wall-300-floating"), _bundled("boulders")])
+    for payload in good:
+        assert_small(payload)
+    check_small([_bundled("wall-300-floating"), _bundled("boulders")])
 
 
 @pytest.mark.parametrize("form", Format)
