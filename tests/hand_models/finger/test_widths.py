@@ -60,14 +60,14 @@ def assert_clear(seed: int) -> None:
     assert depths(hand, rock).max() < 2e-4
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(1))
 def test_no_rock_is_in_a_frame_anywhere_across_it(seed: int) -> None:
     assert_clear(seed)
 
 
 @pytest.mark.slow
-def test_no_rock_is_in_any_frame_of_a_hundred_hands() -> None:
-    for seed in range(3, 103):
+def test_no_rock_is_in_any_frame_of_sixty_hands() -> None:
+    for seed in range(1, 61):
         assert_clear(seed)
 
 

@@ -142,6 +142,7 @@ def test_a_hand_without_a_rest_is_refused(hold, grasp: Grasp, why: str) -> None:
     assert "'given'" in error.message
 
 
+@pytest.mark.slow
 def test_a_search_without_a_rest_ends_early(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a ball of 130 mm a pinch is tilted as far as it may be, and has no rest on the way."""
     hand, closed = spiny_hand(), 0

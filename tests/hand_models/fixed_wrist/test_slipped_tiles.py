@@ -30,7 +30,9 @@ def slips(hand: SettledHand, seed: int) -> list[int]:
     return chance.choice(on, count, replace=False).tolist()
 
 
-@pytest.mark.parametrize("first", range(0, 80, 20))
+@pytest.mark.parametrize(
+    "first", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(20, 80, 20))]
+)
 def test_loads_are_those_of_the_balance_of_the_joints(first: int):
     states: Counter[str] = Counter()
     for seed in range(first, first + 20):

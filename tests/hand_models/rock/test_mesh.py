@@ -228,7 +228,7 @@ def test_fingers_curl_under_boulders_behind_their_joints(seed):
     assert_on_rock(seed)
 
 
-@pytest.mark.parametrize("seed", [89, 232, 48338])
+@pytest.mark.parametrize("seed", [89, 232, pytest.param(48338, marks=pytest.mark.slow)])
 def test_fingers_reach_over_boulders_that_fall_off_steeply(seed):
     assert_on_rock(seed)
 

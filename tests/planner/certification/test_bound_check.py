@@ -41,7 +41,7 @@ def open_climb():
     return found
 
 
-@pytest.mark.parametrize("sizes", [(5, 2, 0.75), (5, 3, 0.7)])
+@pytest.mark.parametrize("sizes", [(5, 2, 0.75), pytest.param((5, 3, 0.7), marks=pytest.mark.slow)])
 @settings(max_examples=4)
 @given(seed=SEEDS, multiple=st.floats(0.1, 4.0))
 def test_agrees_with_exhaustion(sizes, seed, multiple):

@@ -200,14 +200,14 @@ def test_an_equilibrium_that_the_check_refuses_is_not_reported(spoilt: str) -> N
 def test_all_equilibria_pass_the_check_wherever_hands_are_displaced() -> None:
     for name in ("wall-300", "overhang"):
         prepared, answer = planned(name)
-        displacements, checked = 2.0 * some(5, 16), []
+        displacements, checked = 2.0 * some(5, 6), []
 
         def passes(closed, hands, sample, prepared=prepared, checked=checked) -> bool:
             checked.append(execution_passes(prepared, closed, hands, sample))
             return checked[-1]
 
         execute(prepared, hands_of(answer), displacements, passes=passes)
-        assert len(checked) > 12
+        assert len(checked) > 4
         assert all(checked)
 
 
@@ -285,6 +285,7 @@ def test_softer_limbs_bear_displaced_hands_better_than_rigid_ones() -> None:
     assert soft.median < 0.8 * rigid.median
 
 
+@pytest.mark.slow
 def test_floating_hands_stand_still_at_their_preload() -> None:
     question = executed("slab", samples=2, position=0.0, height=0.0, tilt=0.0, yaw=0.0)
     hands = [replace(hand, wrist="floating") for hand in question.stance.hands]

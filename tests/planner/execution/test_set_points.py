@@ -260,7 +260,7 @@ def test_loads_that_do_not_pass_the_checks_balance_nothing(monkeypatch, off):
     assert [each.utilisation for each in sent_plans(prepared, own, 0.0)] == [None, None]
 
 
-@pytest.mark.parametrize("wrist", ["compliant", "floating"])
+@pytest.mark.parametrize("wrist", ["compliant", pytest.param("floating", marks=pytest.mark.slow)])
 def test_where_wrists_move_limbs_balance_the_body_on_tensions_that_are_kept(wrist):
     draws = (drawn(68.1), drawn(90.0), drawn(finger=seat(0.0244)))
     asked = replace(with_wrists("overhang", wrist), draws=draws, want=frozenset({"spread"}))

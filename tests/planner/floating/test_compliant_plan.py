@@ -55,6 +55,7 @@ def answered(name: str = "wall-300", *, palm: bool = True) -> Plan:
     return plan(asked(name, palm=palm))
 
 
+@pytest.mark.slow
 def test_what_the_search_for_the_load_factor_comes_upon_is_the_plan() -> None:
     """The whole wrench is a part of the largest one: its plan uses less than in proportion."""
     wrench = np.array([1025.0909, -107.1625, -67.3291, -3.4212, -134.7414, 4.1731])
@@ -300,6 +301,7 @@ def random_start(hands: HandSets, rng: np.random.Generator) -> LinearisationPoin
     return replace(hands.at_rest(), loads=tuple(loads))
 
 
+@pytest.mark.slow
 def test_searches_that_end_far_from_a_balance_go_on_from_there() -> None:
     hands, rng = prepare_stance(asked("slab")).hands, np.random.default_rng(0)
     starts = [random_start(hands, rng) for _ in range(15)]

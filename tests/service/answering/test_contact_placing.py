@@ -135,6 +135,7 @@ def test_what_cannot_be_placed_by_contact_is_refused_by_name(
     assert why in error["message"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_places")
 def test_robust_says_what_contact_leaves_and_that_each_number_is_planned_anew() -> None:
     request = request_of(want=["load_factor", "robust"])

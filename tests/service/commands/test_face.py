@@ -35,12 +35,12 @@ from tests.suite.helpers.requests import HEAVY, put, wall_request
     "words",
     [
         ["plan", "slab"],
-        ["redundancy", "slab"],
+        pytest.param(["redundancy", "slab"], marks=pytest.mark.slow),
         ["wrench-space", "slab", "--hand", "front_left", "--opening"],
         ["body-space", "ledge"],
         ["body-space", "ledge", "--com"],
         ["sweep", "slab", "--vary", "load.mass=100,120"],
-        ["study", "fig06"],
+        pytest.param(["study", "fig06"], marks=pytest.mark.slow),
     ],
     ids=" ".join,
 )

@@ -212,7 +212,10 @@ def test_a_service_that_starts_ends_at_once_with_its_processes(number):
 
 
 @watched
-@pytest.mark.parametrize("missing", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize(
+    "missing",
+    [*(pytest.param(m, marks=pytest.mark.slow) for m in ("<&-", ">&-", "2>&-")), "<&- >&- 2>&-"],
+)
 def test_standard_streams_that_are_closed_cost_nothing_but_themselves(missing):
     own = f"{shlex.quote(sys.executable)} -c 'from service.commands import main; main()'"
     done = subprocess.run(

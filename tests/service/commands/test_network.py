@@ -123,7 +123,7 @@ def test_zenoh_may_talk_but_not_on_standard_output(stance_file):
     )
 
 
-@pytest.mark.parametrize("mode", ["client", "peer"])
+@pytest.mark.parametrize("mode", ["client", pytest.param("peer", marks=pytest.mark.slow)])
 def test_a_query_waits_for_a_service_that_is_not_there_yet(mode, stance_file):
     endpoint = free_endpoint()
     flags = ["-m", mode, "-e", endpoint, "--no-multicast-scouting", "--wait", str(PATIENCE)]

@@ -286,7 +286,9 @@ def test_stray_points_are_told_and_dropped(tmp_path, capfd):
         assert words in complaint(capfd)
 
 
-@pytest.mark.parametrize("ending", ["ply", "stl", "obj", "off"])
+@pytest.mark.parametrize(
+    "ending", ["ply", "stl", *(pytest.param(e, marks=pytest.mark.slow) for e in ("obj", "off"))]
+)
 def test_the_triangles_of_a_file_are_kept(ending, tmp_path, capfd):
     mesh = trimesh.creation.icosphere(3, radius=0.2)
     path, output = tmp_path / f"ball.{ending}", tmp_path / "rock.ply"

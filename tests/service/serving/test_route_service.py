@@ -80,6 +80,7 @@ def test_knots_come_in_replies_that_a_small_client_takes(client):
     assert (caught.value.kind, caught.value.field) == ("limit", "max_reply_bytes")
 
 
+@pytest.mark.slow
 def test_a_program_that_gets_one_reply_only_gets_it_whole(client):
     """In parts, whoever lets zenoh consolidate replies has the last one."""
     request = msgspec.json.encode(asked(two_moves(), "trajectory", parts=True))
@@ -87,6 +88,7 @@ def test_a_program_that_gets_one_reply_only_gets_it_whole(client):
     assert b'"status":"optimal"' in reply.ok.payload.to_bytes()
 
 
+@pytest.mark.slow
 def test_parts_end_with_what_a_failing_move_still_has(client):
     parts: list[PartReply] = []
     reply = client.route(asked(blocked(), "trajectory"), parts.append)
