@@ -62,7 +62,7 @@ def test_a_service_has_a_hand_of_its_own_and_a_request_the_last_word(
     plain = request_for(mass=HEAVY)
     heavy = own("hand", "mass", 12.6)
     hand = stance_file(entry_toml("structure", "held_mass", 20.0), "own.toml")
-    served = Served(free_endpoint(), "--hand", hand)
+    served = Served(free_endpoint(), "--workers", "1", "--hand", hand)
     default = own("structure", "held_mass", 20.0)
     try:
         with zenoh.open(client_config(served.endpoint)) as session:

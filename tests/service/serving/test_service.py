@@ -329,7 +329,7 @@ def test_a_signal_stops_the_server_cleanly(number: int, busy: bool) -> None:
 @pytest.mark.slow
 def test_a_second_server_of_one_robot_warns(served: Served) -> None:
     def said() -> list[str]:
-        second = Served(free_endpoint(), "-e", served.endpoint)
+        second = Served(free_endpoint(), "-e", served.endpoint, "--workers", "1")
         return second.stop(signal.SIGTERM)[1].splitlines()
 
     # the first's token may not have been heard of yet
@@ -361,7 +361,7 @@ def test_a_rival_is_one_of_the_same_robot_and_while_it_serves() -> None:
 @pytest.mark.slow
 def test_a_killed_server_is_noticed_and_its_successor_found() -> None:
     endpoint = free_endpoint()
-    server = Served(endpoint)
+    server = Served(endpoint, "--workers", "1")
     config = zenoh_config(mode="client", connect=[endpoint], multicast=False)
     with CruxClient(config, timeout=0.5 * PATIENCE) as client:
         assert client.plan(plan_request()).status == "optimal"
@@ -382,7 +382,7 @@ def test_a_killed_server_is_noticed_and_its_successor_found() -> None:
         asking.join(PATIENCE)
         # not that its time is over
         assert isinstance(outcome[0], NoServiceError)
-        successor = Served(endpoint)
+        successor = Served(endpoint, "--workers", "1")
 
         def found() -> bool:
             with contextlib.suppress(NoServiceError):
@@ -515,7 +515,7 @@ def test_a_port_that_is_the_systems_to_choose_is_told() -> None:
 @pytest.mark.slow
 def test_a_server_that_others_can_reach_says_what_that_exposes() -> None:
     port = free_endpoint().rpartition(":")[2]
-    server = Served(f"tcp/0.0.0.0:{port}")
+    server = Served(f"tcp/0.0.0.0:{port}", "--workers", "1")
     listens, ready, exposes = server.stop(signal.SIGTERM)[1].splitlines()
     assert listens.startswith(f"crux: listening on tcp/0.0.0.0:{port}; ")
     assert ready.startswith("crux: ready; serving ")
@@ -524,7 +524,7 @@ def test_a_server_that_others_can_reach_says_what_that_exposes() -> None:
 
 @pytest.mark.slow
 def test_a_log_line_a_question() -> None:
-    server = Served(free_endpoint(), "-v", "--log-format", "json")
+    server = Served(free_endpoint(), "--workers", "1", "-v", "--log-format", "json")
     with CruxClient(client_config(server.endpoint), timeout=PATIENCE) as client:
         client.plan(plan_request())
         bad = msgspec.structs.replace(plan_request(), confidence=0.99, id="bad")
@@ -543,7 +543,7 @@ def test_a_log_line_a_question() -> None:
 def test_a_log_that_nobody_reads_keeps_nobody_waiting() -> None:
     import fcntl
 
-    server = Served(free_endpoint(), "-v", "--log-format", "json")
+    server = Served(free_endpoint(), "--workers", "1", "-v", "--log-format", "json")
     # room for some twenty lines
     fcntl.fcntl(server.process.stderr, fcntl.F_SETPIPE_SZ, 4096)
     with zenoh.open(client_config(server.endpoint)) as session:
