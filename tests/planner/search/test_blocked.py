@@ -1,5 +1,6 @@
 """Moves that may not be made: the search goes round them, and its bound stays that of the loads."""
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -16,11 +17,17 @@ from tests.suite.helpers.certificates import (
 )
 
 
+@cache
+def climb_and_factors():
+    """A climb of seven states at best, and the load factor of each state of its wall."""
+    climb = random_climb(34, placements=5, bodies=3, reach=0.6)
+    return climb, {state: solved_state(climb, state)[0] for state in every_state(climb)}
+
+
 @pytest.mark.parametrize("at", [0, 2, 5])
 def test_a_blocked_move_is_gone_round_and_leaves_the_bound(at, monkeypatch):
     """A shift at the start, a lift on the way, and a shift at the goal."""
-    climb = random_climb(34, placements=5, bodies=3, reach=0.6)
-    factors = {state: solved_state(climb, state)[0] for state in every_state(climb)}
+    climb, factors = climb_and_factors()
     best, route = best_climb(climb, factors)
     blocked = list(pairwise(route))[at]
     monkeypatch.setattr(
@@ -37,8 +44,7 @@ def test_a_blocked_move_is_gone_round_and_leaves_the_bound(at, monkeypatch):
 
 
 def test_moves_that_do_not_pass_are_gone_round_as_blocked_ones_are():
-    climb = random_climb(34, placements=5, bodies=3, reach=0.6)
-    factors = {state: solved_state(climb, state)[0] for state in every_state(climb)}
+    climb, factors = climb_and_factors()
     _, route = best_climb(climb, factors)
     wall, start, goal = wall_of(climb)
     for at in (0, 2, 5):
@@ -51,8 +57,7 @@ def test_moves_that_do_not_pass_are_gone_round_as_blocked_ones_are():
 
 
 def test_below_the_floor_nothing_counts_and_above_it_nothing_changes():
-    climb = random_climb(34, placements=5, bodies=3, reach=0.6)
-    factors = {state: solved_state(climb, state)[0] for state in every_state(climb)}
+    climb, factors = climb_and_factors()
     best, _ = best_climb(climb, factors)
     wall, start, goal = wall_of(climb)
     np.testing.assert_allclose(search(wall, start, goal, floor=0.9 * best).least, best, rtol=1e-7)
