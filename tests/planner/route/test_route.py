@@ -216,14 +216,14 @@ def test_the_command_asks_for_the_spread_of_every_stance(tmp_path: Path, capfd):
 
 def test_processes_give_what_one_process_gives_and_tell_their_progress(route, result):
     seen: list[tuple[int, int]] = []
-    spread = evaluate(route, workers=2, progress=lambda done, total: seen.append((done, total)))
-    assert [p.status for p in spread.plans] == [p.status for p in result.plans]
+    short = replace(route, moves=route.moves[:3])
+    spread = evaluate(short, workers=2, progress=lambda done, total: seen.append((done, total)))
+    count = len(spread.plans)
+    alone = result.plans[:count]
+    assert [p.status for p in spread.plans] == [p.status for p in alone]
     np.testing.assert_allclose(
-        [p.utilisation for p in spread.plans],
-        [p.utilisation for p in result.plans],
-        rtol=1e-6,
+        [p.utilisation for p in spread.plans], [p.utilisation for p in alone], rtol=1e-6
     )
-    count = len(result.plans)
     assert seen == [(i, count) for i in range(1, count + 1)]
 
 
@@ -236,19 +236,18 @@ def test_a_killed_process_costs_no_stage(route, result):
             child.kill()
             killed.append(child.pid)
 
-    survived = evaluate(route, workers=2, progress=kill_one)
+    survived = evaluate(replace(route, moves=route.moves[:3]), workers=2, progress=kill_one)
     assert killed
+    alone = result.plans[: len(survived.plans)]
     np.testing.assert_allclose(
-        [p.utilisation for p in survived.plans],
-        [p.utilisation for p in result.plans],
-        rtol=1e-6,
+        [p.utilisation for p in survived.plans], [p.utilisation for p in alone], rtol=1e-6
     )
 
 
 def test_where_no_process_starts_all_is_planned_here(route, result, monkeypatch):
     monkeypatch.setattr("planner.route.evaluation._planning", workshop.nothing)
-    alone = evaluate(route, workers=2)
-    assert [p.utilisation for p in alone.plans] == [p.utilisation for p in result.plans]
+    alone = evaluate(replace(route, moves=route.moves[:1]), workers=2).plans
+    assert [p.utilisation for p in alone] == [p.utilisation for p in result.plans[: len(alone)]]
 
 
 @pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
