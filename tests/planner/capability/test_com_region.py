@@ -238,7 +238,9 @@ def shaken(by: float) -> tuple[ComRegion, ComSolid | None]:
     )
 
 
-@pytest.mark.parametrize(("by", "inside"), [(0.2, True), (0.5, False)])
+@pytest.mark.parametrize(
+    ("by", "inside"), [(0.2, True), pytest.param(0.5, False, marks=pytest.mark.slow)]
+)
 def test_the_solids_margin_is_the_distance_to_its_surface(by, inside):
     region, solid = shaken(by)
     facets = ConvexHull(solid.inner).equations

@@ -106,6 +106,7 @@ def test_palms_never_make_a_plan_worse(name: str) -> None:
     assert with_palms.utilisation <= without.utilisation + 1e-3
 
 
+@pytest.mark.slow
 def test_neither_do_palms_of_floating_wrists() -> None:
     used = {}
     for palm in (True, False):
@@ -259,6 +260,7 @@ def test_hands_on_their_nails_are_refused() -> None:
         plan(asked("ledge"))
 
 
+@pytest.mark.slow
 def test_a_poor_plan_at_a_kink_is_left_for_a_better_one() -> None:
     """Hands at rest within 0.05 mm of those of `wall-300`: 1.17 once, 0.94 around it."""
     places = [

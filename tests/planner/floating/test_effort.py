@@ -225,6 +225,7 @@ def test_prices_at_floating_hands_are_slopes(limited, at, step, limit):
     assert 0.99 * more - 1e-6 <= told[0] <= 1.01 * less + 1e-6
 
 
+@pytest.mark.slow
 def test_effort_prices_at_floating_hands_are_slopes():
     question, step = with_joints(), 1.0
     low, here, high = (least(of_force(question, 80.0 + d)) for d in (-step, 0.0, step))

@@ -172,7 +172,7 @@ def test_streams_tell_as_much_as_is_asked_for(form: Format) -> None:
 
 
 @pytest.mark.parametrize("form", Format)
-@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("known", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_a_stream_of_compliant_wrists_says_where_limbs_aim(form: Format, known: bool) -> None:
     request = compliant_request()
     if not known:

@@ -65,6 +65,7 @@ def test_chunks_in_a_file_are_not_worked_out_again(tmp_path):
     assert kept.read_bytes() == whole
 
 
+@pytest.mark.slow
 def test_other_bodies_leave_placements_as_they_are(tmp_path):
     kept, other = (
         tmp_path / "chunks",
