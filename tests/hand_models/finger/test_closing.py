@@ -51,7 +51,7 @@ def close_one(*opened, model=MODEL):
 # Everywhere ---------------------------------------------------------------------------------------
 
 
-@given_some(8, 2000, seeds)
+@given_some(8, 1000, seeds)
 @example(235630260)
 def test_wherever_a_finger_closes_it_is_clear_of_rock_whole_and_in_balance(seed):
     on_hold = random_opening(MODEL, seed)
@@ -103,7 +103,7 @@ def test_on_rough_rock_fingers_close():
 @pytest.mark.slow
 @pytest.mark.parametrize("first", [10_000])
 def test_on_rough_rock_fingers_close_slow(first):
-    on_rough_rock(first, 500)
+    on_rough_rock(first, 300)
 
 
 def test_spines_are_pulled_off_where_their_drag_is_too_little_for_the_pull():
@@ -189,7 +189,7 @@ def openings_of(seeds):
 @pytest.mark.slow
 @pytest.mark.parametrize("part", range(4))
 def test_fingers_end_where_a_plain_simulation_does(part):
-    apart, count = compared(list(openings_of(range(10 * part, 10 * part + 10))))
+    apart, count = compared(list(openings_of(range(8 * part, 8 * part + 8))))
     assert len(apart) <= 0.2 * count, apart
 
 
