@@ -16,7 +16,7 @@ from planner.solving import plan
 from tests.suite.helpers.rocks import random_mesh
 from tests.suite.helpers.stances import ask, on_wall, random_stance
 
-TIMES = 10
+TIMES = 6
 """That the rock of each stance is moved."""
 
 
