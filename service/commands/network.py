@@ -16,6 +16,7 @@ import msgspec
 from hand_models.base import InvalidInputError
 from service import answering, bulk, processes, requests, serving, tables, wire
 from service.commands import options, stances
+from service.ros2 import ros_domain
 
 if TYPE_CHECKING:
     import zenoh
@@ -75,6 +76,12 @@ def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
     help="Give Prometheus its text over HTTP on this port of this machine.",
 )
 @click.option("--log-format", type=click.Choice(["text", "json"]), default="text")
+@click.option("--ros2", is_flag=True, help="Be a node of ROS 2, too, by rmw_zenoh's convention.")
+@click.option(
+    "--domain",
+    type=click.IntRange(0, 232),
+    help="ROS domain of --ros2; by default that of ROS_DOMAIN_ID, or 0.",
+)
 @options.json_option
 def serve_command(
     config: zenoh.Config,
@@ -83,6 +90,8 @@ def serve_command(
     seconds: float,
     metrics_port: int | None,
     log_format: str,
+    ros2: bool,
+    domain: int | None,
     as_json: bool,
 ) -> None:
     """Answer questions on zenoh until SIGTERM or Ctrl-C.
@@ -91,6 +100,8 @@ def serve_command(
     numbers that a question gives replace the hand's. The robot of --robot is the only one that is
     planned for, and gives the keys its name.
     """
+    if domain is not None and not ros2:
+        raise InvalidInputError("has no meaning without --ros2; give both", field="--domain")
     stop = _StopSignal()
     # a client that does not read blocks one of these threads while zenoh waits for it
     threads = "(rx: (worker_threads: 4), net: (worker_threads: 4), tx: (worker_threads: 4))"
@@ -107,7 +118,12 @@ def serve_command(
     endpoints = serving.listening(config)
     with serving.ended_in_time(serving.open_session(config)) as session:
         service = serving.PlanService(
-            session, own.robot, own.hand, workers=workers, seconds=seconds
+            session,
+            own.robot,
+            own.hand,
+            workers=workers,
+            seconds=seconds,
+            ros_domain=ros_domain(domain) if ros2 else None,
         )
         if metrics_port is not None:
             service.serve_metrics(metrics_port)
@@ -120,9 +136,13 @@ def serve_command(
         tables.remark(f"listening on {where}; the workers start, which takes some seconds")
         with service:
             stop.waits_for()
+            node = service.ros
             if as_json:
-                tables.say({"v": 1, "keys": service.keys, "listen": endpoints})
+                own_names = {} if node is None else {"ros2": (*node.services, *node.topics)}
+                tables.say({"v": 1, "keys": service.keys, "listen": endpoints} | own_names)
             tables.remark(f"ready; serving {', '.join(service.keys)}")
+            if node is not None:
+                tables.remark(f"in ROS 2: {', '.join((*node.services, *node.topics))}")
             if open_to := serving.exposed(config):
                 tables.note(
                     f"{', '.join(open_to)}: whoever reaches it can ask, and read what zenoh "

@@ -14,6 +14,7 @@ from service.answering import SERVICES_BY_NAME
 from service.processes import Job
 from service.publishing import PublishedWrench
 from service.requests import LEAST_REPLY_BYTES, LONGEST_DEADLINE, CancelRequest
+from service.ros2 import RosCall
 from service.serving.settings import SERVING_SETTINGS
 from service.wire import (
     LARGEST_ERROR,
@@ -27,8 +28,8 @@ from service.wire import (
 
 __all__ = ["AnyQuery", "PendingQuestion", "client_of", "received_question"]
 
-AnyQuery = zenoh.Query | PublishedWrench
-"""What is answered: a query, or a published wrench, whose answer is published."""
+AnyQuery = zenoh.Query | PublishedWrench | RosCall
+"""What is answered: a query, a published wrench, whose answer is published, or a ROS 2 call."""
 
 
 class _Head(msgspec.Struct):
@@ -50,7 +51,7 @@ class PendingQuestion:
 
     Attributes
     ----------
-    query : zenoh.Query or PublishedWrench
+    query : zenoh.Query, PublishedWrench or RosCall
         The query, which gets exactly one last reply, and before it parts if it asks for them.
     key : str
         Key at which the query arrived.
@@ -173,7 +174,7 @@ def received_question(query: AnyQuery, key: str, arrived: float, longest: float)
 
     Parameters
     ----------
-    query : zenoh.Query or PublishedWrench
+    query : zenoh.Query, PublishedWrench or RosCall
         The query.
     key : str
         Key at which the query arrived; of a wrench, where its set-points are published.

@@ -20,6 +20,7 @@ from service.answering import SERVICES_BY_NAME, robots_of
 from service.processes import Job, answering
 from service.publishing import PublishedWrenches
 from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
+from service.ros2 import RosNode
 from service.serving.config import close_at_once
 from service.serving.dispatcher import Dispatcher
 from service.serving.settings import SERVING_SETTINGS
@@ -50,6 +51,9 @@ class PlanService:
         Deadline of a question that names none [s].
     memory : int, optional
         Largest memory of each worker [bytes], where the operating system can limit it.
+    ros_domain : int, optional
+        Number of the ROS domain in which the service is a node of ROS 2, too; by default it is
+        none.
     make : callable, optional
         Called once in each worker; returns the function that answers a `Job`. Pickled. By default
         the planner answers.
@@ -62,11 +66,14 @@ class PlanService:
         Zenoh keys of the questions that the service answers.
     operators : tuple of str
         Zenoh keys of the service's health and of its metrics.
+    ros : RosNode or None
+        The node of ROS 2.
 
     Raises
     ------
     InvalidInputError
-        If ``workers`` is below 1, or ``seconds`` is not above 0 and at most 600 s.
+        If ``workers`` is below 1, or ``seconds`` is not above 0 and at most 600 s; or if there can
+        be no node of ROS 2.
     LostError
         On entering, if no worker starts.
     """
@@ -80,6 +87,7 @@ class PlanService:
         workers: int | None = None,
         seconds: float = DEFAULT_DEADLINE,
         memory: int = 2 * 2**30,
+        ros_domain: int | None = None,
         make: Make[Job, Answer] | None = None,
     ) -> None:
         # even on one core, what takes long leaves a process to others
@@ -99,6 +107,7 @@ class PlanService:
         )
         self._alive = service_key(self.robot, ServiceName.ALIVE)
         self._session = session
+        self.ros = None if ros_domain is None else RosNode(session, self.robot, ros_domain)
         made = make or partial(answering, robot, hand)
         self._wrenches = PublishedWrenches(session, self.robot)
         pool = WorkerPool(made, count, memory, self._wrenches.keep)
@@ -153,6 +162,9 @@ class PlanService:
         self._until_the_end(info.declare_transport_events_listener(links, history=True))
         liveliness = self._session.liveliness()
         self._until_the_end(liveliness.declare_subscriber(self._client_key("*"), self._client))
+        if self.ros is not None:
+            self._open.callback(self.ros.close)
+            self.ros.open(self._dispatcher.ask, self._monitor.health)
         self._open.callback(self._dispatcher.stop)
         self._until_the_end(liveliness.declare_token(self._alive))
         return self
