@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Self
 
 import zenoh
@@ -31,6 +32,8 @@ class RosCall:
     service : Endpoint
         The service that is called.
     messages : RosMessages
+    answered : callable
+        Called with the response to a request that is answered, before it is sent.
 
     Raises
     ------
@@ -39,9 +42,15 @@ class RosCall:
     """
 
     def __init__(
-        self, query: zenoh.Query, key: str, service: Endpoint, messages: RosMessages
+        self,
+        query: zenoh.Query,
+        key: str,
+        service: Endpoint,
+        messages: RosMessages,
+        answered: Callable[[Any], None],
     ) -> None:
         self._query, self._key, self._service, self._messages = query, key, service, messages
+        self._answered = answered
         given = query.attachment
         self._attached = Attachment.read(b"" if given is None else given.to_bytes())
         self._payload = zenoh.ZBytes(b"")
@@ -95,7 +104,9 @@ class RosCall:
         encoding : str
             Zenoh encoding of the payload.
         """
-        self._send(self._messages.response(f"{self._service.type}_Response", payload))
+        response = self._messages.response(f"{self._service.type}_Response", payload)
+        self._answered(response)
+        self._send(response)
 
     def reply_err(self, payload: bytes, *, encoding: str) -> None:
         """Send an encoded `ErrorReply` as the response of the service."""

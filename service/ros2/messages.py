@@ -16,7 +16,7 @@ from service.ros2.definitions import RosTypes
 from service.ros2.health import DiagnosticState
 from service.wire import ServiceName
 
-__all__ = ["RosMessages"]
+__all__ = ["RosMessages", "wrench_entries"]
 
 
 class _Finger(msgspec.Struct):
@@ -131,26 +131,21 @@ class RosMessages:
         }
         return self.types.make(kind, **{name: values[name] for name in self.types.fields(kind)})
 
-    def set_points(self, published: PublishedReply, stamp: int) -> Any:
+    def set_points(self, published: PublishedReply) -> Any:
         """Return published set-points as ``sensor_msgs/msg/JointState``; None where there are none.
 
         A message without a status must not have set-points that exceed a limit: there are some
-        only where the status is ``optimal`` and the check passed.
-
-        Parameters
-        ----------
-        published : PublishedReply
-        stamp : int
-            Unix time of the wrench [ns].
+        only where the status is ``optimal`` and the check passed. Their stamp is the number of
+        their wrench.
         """
-        points = published.set_points
-        if points is None or not points.verified or points.status != "optimal":
+        points, number = published.set_points, published.number
+        if points is None or not points.verified or points.status != "optimal" or number is None:
             return None
         hands = [
             _Hand(hand.limb, tensions=hand.tensions, winch_angle=hand.winch_angle)
             for hand in points.hands or []
         ]
-        return self._joints(hands, stamp)
+        return self._joints(hands, number)
 
     def diagnostics(self, states: Sequence[DiagnosticState]) -> Any:
         """Return states as ``diagnostic_msgs/msg/DiagnosticArray``."""

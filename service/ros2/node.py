@@ -20,6 +20,7 @@ from service.ros2.health import service_state
 from service.ros2.messages import RosMessages
 from service.ros2.names import Attachment, Endpoint, EndpointKind, NodeNames
 from service.ros2.settings import ROS_SETTINGS
+from service.ros2.topics import RosStream
 from service.wire import Answer, ServiceName, service_key
 
 __all__ = ["RosNode"]
@@ -70,7 +71,11 @@ class RosNode:
         }
         self.services = tuple(service.name for service in self._services.values())
         self._diagnostics = self._endpoint("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
-        self.topics = (self._diagnostics.name,)
+        self._wrenches = self._endpoint(
+            self._names.private("body_wrench"), "geometry_msgs/msg/WrenchStamped"
+        )
+        self._tendons = self._endpoint(self._names.private("tendons"), "sensor_msgs/msg/JointState")
+        self.topics = (self._diagnostics.name, self._wrenches.name, self._tendons.name)
         self._numbers = itertools.count(1)
         self._closing = threading.Event()
         self._open = ExitStack()
@@ -87,14 +92,26 @@ class RosNode:
         """
         liveliness = self._session.liveliness()
         self._until_the_end(liveliness.declare_token(self._names.node_token()))
+        stream = RosStream(
+            self._session, self._robot, self._messages, self._publisher(self._tendons)
+        )
+        self._open.callback(stream.close)
+        key = self._names.key(self._wrenches)
+        self._until_the_end(self._session.declare_subscriber(key, stream.take))
+        self._announce(EndpointKind.SUBSCRIPTION, self._wrenches)
+
+        def answered(response: Any) -> None:
+            if response.__msgtype__ == "crux_msgs/srv/Stream_Response":
+                stream.follow(response.stream)
+
         for name, service in self._services.items():
             key = self._names.key(service)
-            call = partial(self._called, ask, name, key, service)
+            call = partial(self._called, ask, answered, name, service)
             self._until_the_end(self._session.declare_queryable(key, call, complete=True))
             self._announce(EndpointKind.SERVICE, service)
         publish = self._publisher(self._diagnostics)
         thread = threading.Thread(
-            target=self._report, args=(health, publish), name="crux-ros", daemon=True
+            target=self._report, args=(health, stream, publish), name="crux-ros", daemon=True
         )
         self._open.callback(thread.join)
         self._open.callback(self._closing.set)
@@ -130,10 +147,15 @@ class RosNode:
         return publish
 
     def _called(
-        self, ask: Ask, name: ServiceName, key: str, service: Endpoint, query: zenoh.Query
+        self,
+        ask: Ask,
+        answered: Callable[[Any], None],
+        name: ServiceName,
+        service: Endpoint,
+        query: zenoh.Query,
     ) -> None:
         try:
-            call = RosCall(query, key, service, self._messages)
+            call = RosCall(query, self._names.key(service), service, self._messages, answered)
         except InvalidInputError as error:
             # not by ROS 2, where no error reply is read
             log.warning("a call of %s is not answered: %s", service.name, error)
@@ -147,8 +169,10 @@ class RosNode:
             return
         ask(call, service_key(self._robot, name))
 
-    def _report(self, health: Callable[[], Answer], publish: Callable[[Any], None]) -> None:
+    def _report(
+        self, health: Callable[[], Answer], stream: RosStream, publish: Callable[[Any], None]
+    ) -> None:
         """Publish the state of the service until the node closes."""
         while not self._closing.wait(ROS_SETTINGS.diagnostics_period):
             reply = msgspec.json.decode(health().payload, type=HealthReply)
-            publish(self._messages.diagnostics([service_state(reply)]))
+            publish(self._messages.diagnostics([service_state(reply), stream.state()]))

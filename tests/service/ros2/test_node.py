@@ -58,6 +58,16 @@ class Caller:
         key = self.peer.key(DOMAIN, name, kind)
         return self.session.declare_subscriber(key, take), got
 
+    def publish(self, wrench: list[float], stamp: int, frame: str = "B") -> None:
+        """Publish a body wrench, in B if nothing else is said, with a stamp in ns."""
+        name, kind = f"{NODE}/body_wrench", "geometry_msgs/msg/WrenchStamped"
+        at = dict(zip(("sec", "nanosec"), divmod(stamp, 10**9), strict=True))
+        header = {"stamp": at, "frame_id": frame}
+        message = {"header": header, "wrench": as_wrench(wrench)}
+        attached = struct.pack("<qqB", 1, stamp, 16) + bytes(16)
+        key = self.peer.key(DOMAIN, name, kind)
+        self.session.put(key, self.peer.encode(kind, message), attachment=attached)
+
 
 @pytest.fixture(scope="module")
 def router() -> Iterator[str]:
@@ -113,7 +123,9 @@ def test_ros_sees_the_node_with_its_services_and_topics(call: Caller, service: S
         assert key == call.peer.key(DOMAIN, f"{NODE}/{name}", full)
         assert token[12:] == ["::,10:,:,:,,"]
         named.append(f"{NODE}/{name}")
-    assert service.ready["ros2"] == [*named, *(name for _, name in ends)]
+    topics = [("MP", "/diagnostics"), ("MS", f"{NODE}/body_wrench"), ("MP", f"{NODE}/tendons")]
+    assert {*ends} == {*topics}
+    assert service.ready["ros2"] == [*named, *(name for _, name in topics)]
 
 
 def test_a_plan_is_the_one_in_process_and_wrenches_are_of_the_world_on_the_robot(
@@ -220,15 +232,73 @@ def test_a_stream_gives_set_points_also_without_a_tile(call: Caller) -> None:
     assert without["set_points"]["effort"] != whole["set_points"]["effort"]
 
 
-def test_health_is_among_the_diagnostics(call: Caller) -> None:
+@pytest.fixture(scope="module")
+def diagnostics(call: Caller) -> Iterator[queue.Queue]:
     subscriber, got = call.subscribe("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
-    state = got.get(timeout=PATIENCE)["status"][0]
+    yield got
     subscriber.undeclare()
-    assert state["level"] == 0
+
+
+def state_with(got: queue.Queue, which: int, level: int) -> dict[str, Any]:
+    """The next state of a level; of the service (0) or of the stream (1)."""
+    while not got.empty():
+        got.get()
+    while (state := got.get(timeout=PATIENCE)["status"][which])["level"] != level:
+        continue
+    return state
+
+
+def values_of(state: dict[str, Any]) -> dict[str, str]:
+    return {each["key"]: each["value"] for each in state["values"]}
+
+
+def test_health_is_among_the_diagnostics(diagnostics: queue.Queue) -> None:
+    state = state_with(diagnostics, 0, level=0)
     assert state["name"] == "crux/robosimian: service"
-    values = {each["key"]: each["value"] for each in state["values"]}
+    values = values_of(state)
     assert values["processes: streams, idle"] == "1"
     assert int(values["replied"]) >= 0
+
+
+def test_published_wrenches_get_set_points_with_their_stamp(
+    call: Caller, diagnostics: queue.Queue
+) -> None:
+    answer = call("stream", "Stream", request=msgspec.json.encode(stream_request()).decode())
+    first = msgspec.json.decode(answer["reply"])["body_wrench"]
+    subscriber, got = call.subscribe(f"{NODE}/tendons", "sensor_msgs/msg/JointState")
+    stamp = 1_700_000_000_123_456_789
+
+    def sees_set_points() -> bool:
+        call.publish(first, stamp)
+        return not got.empty()
+
+    # a subscription takes its time to reach the service
+    assert soon(sees_set_points)
+    points = got.get()
+    assert points["header"]["stamp"] == {"sec": 1_700_000_000, "nanosec": 123_456_789}
+    asked = {"stream": answer["stream"], "body_wrench": as_wrench(first), "deadline": 0.0}
+    called = call("set_points", "SetPoints", lost=[], **asked)["set_points"]
+    for part in ("name", "effort", "position"):
+        assert points[part] == called[part]
+    values = values_of(state_with(diagnostics, 1, level=0))
+    assert values["stream"] == answer["stream"]
+    assert int(values["set-points published"]) > 0
+    assert float(values["utilisation"]) == pytest.approx(answer["utilisation"], abs=1e-3)
+
+    # an overloaded plan has tensions, but a message without a status must not have them
+    call.publish([10.0 * entry for entry in first], stamp + 1)
+    state = state_with(diagnostics, 1, level=1)
+    assert float(values_of(state)["utilisation"]) > 1.0
+    # further ones of the first stamp may have come late
+    assert all(one["header"]["stamp"] == points["header"]["stamp"] for one in [*got.queue])
+
+    call.publish([math.nan, *first[1:]], stamp + 2)
+    assert state_with(diagnostics, 1, level=2)["message"].startswith("invalid: body_wrench[0]")
+    call.publish(first, stamp + 3, frame="torso")
+    assert soon(
+        lambda: "frame_id 'torso'; valid: 'B'" in state_with(diagnostics, 1, level=2)["message"]
+    )
+    subscriber.undeclare()
 
 
 def test_a_node_that_closes_is_gone(router: str, call: Caller) -> None:
