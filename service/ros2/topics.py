@@ -61,7 +61,10 @@ class RosStream:
             Identifier of the stream.
         """
         key = stream_key(self._robot, stream, ServiceName.SET_POINTS)
-        points = self._session.declare_subscriber(key, self._answered)
+        # what the service itself publishes, and nobody else
+        points = self._session.declare_subscriber(
+            key, self._answered, allowed_origin=zenoh.Locality.SESSION_LOCAL
+        )
         with self._lock:
             before, self._points, self._stream = self._points, points, stream
             self._newest, self._refused, self._sent = None, "", 0
@@ -101,9 +104,7 @@ class RosStream:
             stream_key(self._robot, stream, ServiceName.WRENCH),
             Format.MSGPACK.encode(request),
             encoding=Format.MSGPACK.label(request),
-            congestion_control=zenoh.CongestionControl.DROP,
-            priority=zenoh.Priority.REAL_TIME,
-            express=True,
+            allowed_destination=zenoh.Locality.SESSION_LOCAL,
         )
 
     def state(self) -> DiagnosticState:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+import tomllib
 from itertools import pairwise
 from xml.etree import ElementTree
 
@@ -13,6 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 from hand_models.base import InvalidInputError
 from service.ros2 import definitions, names, ros_domain
 from service.wire import MalformedError
+from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.ros_peer import RosPeer
 
 PACKAGE = definitions.package_folder()
@@ -104,6 +106,8 @@ def test_the_package_builds_every_definition_and_depends_on_what_they_use() -> N
     assert listed == files
     about = ElementTree.parse(PACKAGE / "package.xml").getroot()
     assert about.findtext("name") == PACKAGE.name == "crux_msgs"
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    assert about.findtext("version") == project["version"]
     texts = "".join(file.read_text("utf-8") for file in PACKAGE.glob("*/*.*"))
     used = set(re.findall(r"^(\w+)/", texts, re.MULTILINE)) - {"crux_msgs"}
     assert {each.text for each in about.findall("depend")} == used
