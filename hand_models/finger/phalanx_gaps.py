@@ -14,7 +14,8 @@ less ``fine``: zero for a face that lies flat, and within a few ``fine`` of the 
 beyond first touch. With p = w max(0, gap + depth − g) the force acts at the mean, weighted by p,
 of the places of the phalanx nearest to the rock's points, along the mean of their directions: in
 the middle of a face that lies flat, at the place of least distance on rock that bends away on both
-sides, at the face's end on rock under that end. The place changes without a jump.
+sides, at the face's end on rock under that end. At the edge of what is pressed, p is its mean along
+the rock that the point stands for: the place changes without a jump.
 """
 
 from __future__ import annotations
@@ -29,11 +30,6 @@ from hand_models.finger.path_state import AROUND_FIELDS, SETTINGS_RECORD, SHAPE_
 from hand_models.sections import Complexes, Flags
 
 __all__ = ["near_points", "phalanx_beside", "put_around", "rock_distances"]
-
-
-@compiled()
-def _clipped(value: float, low: float, high: float) -> float:
-    return min(max(value, low), high)
 
 
 @compiled()
@@ -59,7 +55,7 @@ def _from_line(
 @compiled()
 def _from_tile(shape: Record, seen: complex, lift: float) -> complex:
     """Return the way to a point from the axis under the tile."""
-    return seen - complex(_clipped(seen.real, shape.near, shape.far), lift)
+    return seen - complex(min(max(seen.real, shape.near), shape.far), lift)
 
 
 @compiled()
@@ -77,7 +73,7 @@ def _from_axis(shape: Record, seen: complex, bare: bool) -> tuple[complex, float
         square = step.real * step.real + step.imag * step.imag
         beyond, part = seen - corner, 0.0
         if square > 0.0:
-            part = _clipped((beyond * step.conjugate()).real / square, 0.0, 1.0)
+            part = min(max((beyond * step.conjugate()).real / square, 0.0), 1.0)
         beyond -= part * step
         other = _size(beyond)
         if other < distance:
@@ -150,8 +146,7 @@ def phalanx_beside(
     """
     settings, shape = settings[0], shape[0]
     ways, depths = np.empty_like(points), np.empty_like(lengths)
-    tile_gap, first = math.inf, 0
-    back = u.conjugate()
+    tile_gap, first, back = math.inf, 0, u.conjugate()
     for i in range(len(points)):
         ways[i], away, from_tile = _from_axis(shape, (points[i] - joint) * back, bare[i])
         depths[i] = away - shape.radius
@@ -162,15 +157,20 @@ def phalanx_beside(
     tiny = 1e-30  # divides what is zero
     total, place, push = 0.0, 0.0j, 0.0j
     for i in range(len(points)):
-        pressed = (gap + depth - depths[i]) * lengths[i]
-        if pressed > 0.0:
+        # pressure falls evenly along the rock that the point stands for, from its deeper end
+        sunk, fall = gap + depth - depths[i], 0.0
+        for k in range(max(i - 1, 0), min(i + 2, len(points))):
+            if bare[k] == bare[i] and _size(points[k] - points[i]) < 1.5 * lengths[i]:
+                fall = max(fall, 0.5 * (depths[i] - depths[k]))
+        if abs(sunk) < fall:
+            sunk = (sunk + fall) ** 2 / (4.0 * fall)
+        if sunk > 0.0:
+            pressed = sunk * lengths[i]
             out = ways[i] / max(depths[i] + shape.radius, tiny)
             total += pressed
             place += pressed * ((points[i] - joint) * back - ways[i] + shape.radius * out)
             push += pressed * out
-    total = max(total, tiny)
-    push /= total
-    return gap, tile_gap, place / total, push / max(_size(push), tiny)
+    return gap, tile_gap, place / max(total, tiny), push / max(_size(push), tiny)
 
 
 @compiled("c1", "f1", "b1", "c1", "f1", "f1", SHAPE_FIELDS, "c0", "c0", "f0")
@@ -198,7 +198,7 @@ def near_points(
         Margin: the tile's depth and the largest further motion [m].
     """
     shape, back, count = shape[0], u.conjugate(), len(centres)
-    each = len(points) // count
+    each, within = len(points) // count, within + longest.max()
     whole = _from_line(centres, joint, u, shape.near, shape.end, 0.0)
     # the nearest rock under the tiles bounds what is looked at
     first = np.where(bare[::each], math.inf, whole + radii).argmin()
@@ -304,7 +304,7 @@ def _on_rock(
                 above = place.imag + depth * way.imag - shape.lift
                 if depth < math.inf and above < farther[k]:
                     along = place.real + depth * way.real
-                    along -= _clipped(along, shape.near, shape.far)
+                    along -= min(max(along, shape.near), shape.far)
                     farther[k] = min(farther[k], math.sqrt(along * along + above * above))
     total, middle = 0.0, 0.0
     for k in range(strips):

@@ -76,6 +76,15 @@ def test_on_rock_that_bends_away_it_acts_where_the_distance_is_least():
         assert -5.0 * SHAPE.fine < found.gap < 5.0 * SHAPE.fine
 
 
+@pytest.mark.parametrize("radius", [0.01, 0.05, 0.3])
+def test_the_force_keeps_its_place_on_a_bulge_that_moves(radius):
+    """By less than a thousandth of the spacing of the points that stand for the rock."""
+    for moved in np.arange(0.0, 3e-4, 7e-6):
+        along = 0.02 + moved
+        found = beside(Disc(along + 1j * (H + radius), radius), 0.0)
+        assert found.place.real == pytest.approx(along, abs=1e-3 * SHAPE.spacing)
+
+
 def test_the_end_of_a_phalanx_presses_as_a_disc():
     """On rock right ahead of it, and on rock behind its back."""
     wall = Wall(1.0 + 0j, SHAPE.end + SHAPE.radius)
