@@ -22,7 +22,7 @@ from service.serving import open_session, zenoh_config
 from tests.suite.helpers.commands import BAD_INPUT, complaint
 from tests.suite.helpers.patience import PATIENCE, soon
 from tests.suite.helpers.replies import departures
-from tests.suite.helpers.requests import HEAVY, plan_request, stream_request, wall_request
+from tests.suite.helpers.requests import HEAVY, JSON, plan_request, stream_request, wall_request
 from tests.suite.helpers.ros_peer import RosPeer
 from tests.suite.helpers.served import Served, client_config, free_endpoint
 
@@ -280,6 +280,14 @@ def test_published_wrenches_get_set_points_with_their_stamp(
     called = call("set_points", "SetPoints", lost=[], **asked)["set_points"]
     for part in ("name", "effort", "position"):
         assert points[part] == called[part]
+    # set-points that another session makes up are not the service's
+    made_up = msgspec.json.decode(call("set_points", "SetPoints", lost=[], **asked)["reply"])
+    forged = {"v": 1, "stream": answer["stream"], "number": 5, "time": 0.0, "age": 0.0}
+    forged |= {"skipped": 0, "set_points": made_up}
+    assert not departures("PublishedReply", forged)
+    key = f"crux/robosimian/stream/{answer['stream']}/set_points"
+    call.session.put(key, msgspec.json.encode(forged), encoding=JSON)
+
     values = values_of(state_with(diagnostics, 1, level=0))
     assert values["stream"] == answer["stream"]
     assert int(values["set-points published"]) > 0
