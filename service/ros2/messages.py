@@ -121,31 +121,39 @@ class RosMessages:
             "load_factor": _number(read.load_factor),
             "gap": _number(read.gap),
             "set_points": self._joints(hands, now),
-            "wrenches": [
-                self._stamped_wrench([-part for part in hand.wrench], f"{hand.limb}/H", now)
-                for hand in hands
-                if hand.wrench is not None
-            ],
+            "wrenches": self._wrenches(hands, now),
             "vertices": [self.wrench(each) for each in read.vertices or []],
             "reply": reply,
         }
         return self.types.make(kind, **{name: values[name] for name in self.types.fields(kind)})
 
-    def set_points(self, published: PublishedReply) -> Any:
-        """Return published set-points as ``sensor_msgs/msg/JointState``; None where there are none.
+    def set_points(self, published: PublishedReply) -> tuple[Any, list[Any]] | None:
+        """Return published set-points as ROS 2's messages; None where there are none.
 
         A message without a status must not have set-points that exceed a limit: there are some
         only where the status is ``optimal`` and the check passed. Their stamp is the number of
         their wrench.
+
+        Returns
+        -------
+        joints : object
+            ``sensor_msgs/msg/JointState`` of all tendons.
+        wrenches : list of object
+            ``geometry_msgs/msg/WrenchStamped`` of each hand, if the set-points have its wrench.
         """
         points, number = published.set_points, published.number
         if points is None or not points.verified or points.status != "optimal" or number is None:
             return None
         hands = [
-            _Hand(hand.limb, tensions=hand.tensions, winch_angle=hand.winch_angle)
+            _Hand(
+                hand.limb,
+                tensions=hand.tensions,
+                winch_angle=hand.winch_angle,
+                wrench=None if hand.wrench is msgspec.UNSET else hand.wrench,
+            )
             for hand in points.hands or []
         ]
-        return self._joints(hands, number)
+        return self._joints(hands, number), self._wrenches(hands, number)
 
     def diagnostics(self, states: Sequence[DiagnosticState]) -> Any:
         """Return states as ``diagnostic_msgs/msg/DiagnosticArray``."""
@@ -175,12 +183,17 @@ class RosMessages:
         )
         return self.types.make("geometry_msgs/msg/Wrench", force=force, torque=moment)
 
-    def _stamped_wrench(self, entries: Sequence[float], frame: str, stamp: int) -> Any:
-        return self.types.make(
-            "geometry_msgs/msg/WrenchStamped",
-            header=self._header(frame, stamp),
-            wrench=self.wrench(entries),
-        )
+    def _wrenches(self, hands: Sequence[_Hand], stamp: int) -> list[Any]:
+        """Return the wrenches of the rock on the hands, which are minus the hands' own."""
+        return [
+            self.types.make(
+                "geometry_msgs/msg/WrenchStamped",
+                header=self._header(f"{hand.limb}/H", stamp),
+                wrench=self.wrench([-entry for entry in hand.wrench]),
+            )
+            for hand in hands
+            if hand.wrench is not None
+        ]
 
     def _joints(self, hands: Sequence[_Hand], stamp: int) -> Any:
         drives = [drive for hand in hands for drive in hand.drives()]

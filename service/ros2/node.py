@@ -71,11 +71,12 @@ class RosNode:
         }
         self.services = tuple(service.name for service in self._services.values())
         self._diagnostics = self._endpoint("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
-        self._wrenches = self._endpoint(
-            self._names.private("body_wrench"), "geometry_msgs/msg/WrenchStamped"
-        )
-        self._tendons = self._endpoint(self._names.private("tendons"), "sensor_msgs/msg/JointState")
-        self.topics = (self._diagnostics.name, self._wrenches.name, self._tendons.name)
+        private, wrench = self._names.private, "geometry_msgs/msg/WrenchStamped"
+        self._body_wrenches = self._endpoint(private("body_wrench"), wrench)
+        self._hand_wrenches = self._endpoint(private("hand_wrenches"), wrench)
+        self._tendons = self._endpoint(private("tendons"), "sensor_msgs/msg/JointState")
+        topics = (self._diagnostics, self._body_wrenches, self._tendons, self._hand_wrenches)
+        self.topics = tuple(topic.name for topic in topics)
         self._numbers = itertools.count(1)
         self._closing = threading.Event()
         self._open = ExitStack()
@@ -93,12 +94,16 @@ class RosNode:
         liveliness = self._session.liveliness()
         self._until_the_end(liveliness.declare_token(self._names.node_token()))
         stream = RosStream(
-            self._session, self._robot, self._messages, self._publisher(self._tendons)
+            self._session,
+            self._robot,
+            self._messages,
+            self._publisher(self._tendons),
+            self._publisher(self._hand_wrenches),
         )
         self._open.callback(stream.close)
-        key = self._names.key(self._wrenches)
+        key = self._names.key(self._body_wrenches)
         self._until_the_end(self._session.declare_subscriber(key, stream.take))
-        self._announce(EndpointKind.SUBSCRIPTION, self._wrenches)
+        self._announce(EndpointKind.SUBSCRIPTION, self._body_wrenches)
 
         def answered(response: Any) -> None:
             if response.__msgtype__ == "crux_msgs/srv/Stream_Response":

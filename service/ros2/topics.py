@@ -32,8 +32,10 @@ class RosStream:
     robot : str
         Name of the robot.
     messages : RosMessages
-    publish : callable
-        Publishes a ``sensor_msgs/msg/JointState``.
+    publish_joints : callable
+        Publishes the ``sensor_msgs/msg/JointState`` of all tendons.
+    publish_wrench : callable
+        Publishes the ``geometry_msgs/msg/WrenchStamped`` of one hand.
     """
 
     def __init__(
@@ -41,10 +43,12 @@ class RosStream:
         session: zenoh.Session,
         robot: str,
         messages: RosMessages,
-        publish: Callable[[Any], None],
+        publish_joints: Callable[[Any], None],
+        publish_wrench: Callable[[Any], None],
     ) -> None:
         self._session, self._robot = session, robot
-        self._messages, self._publish = messages, publish
+        self._messages = messages
+        self._publish_joints, self._publish_wrench = publish_joints, publish_wrench
         self._lock = threading.Lock()
         self._stream = ""
         self._points: zenoh.Subscriber[None] | None = None
@@ -98,7 +102,7 @@ class RosStream:
             number=number,
             time=1e-9 * number,
             body_wrench=tuple(wrench_entries(given.wrench)),  # type: ignore[arg-type]
-            detail="set_points",
+            detail="hands",
         )
         self._session.put(
             stream_key(self._robot, stream, ServiceName.WRENCH),
@@ -127,9 +131,12 @@ class RosStream:
 
     def _answered(self, sample: zenoh.Sample) -> None:
         reply = read_reply(sample, PublishedReply)
-        joints = self._messages.set_points(reply)
-        if joints is not None:
-            self._publish(joints)
+        found = self._messages.set_points(reply)
+        if found is not None:
+            joints, wrenches = found
+            self._publish_joints(joints)
+            for wrench in wrenches:
+                self._publish_wrench(wrench)
         with self._lock:
             if reply.stream == self._stream:
-                self._newest, self._sent = reply, self._sent + (joints is not None)
+                self._newest, self._sent = reply, self._sent + (found is not None)

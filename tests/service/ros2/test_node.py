@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 import zenoh
 
@@ -22,7 +23,14 @@ from service.serving import open_session, zenoh_config
 from tests.suite.helpers.commands import BAD_INPUT, complaint
 from tests.suite.helpers.patience import PATIENCE, soon
 from tests.suite.helpers.replies import departures
-from tests.suite.helpers.requests import HEAVY, JSON, plan_request, stream_request, wall_request
+from tests.suite.helpers.requests import (
+    HEAVY,
+    JSON,
+    plan_request,
+    pose_of,
+    stream_request,
+    wall_request,
+)
 from tests.suite.helpers.ros_peer import RosPeer
 from tests.suite.helpers.served import Served, client_config, free_endpoint
 
@@ -123,7 +131,12 @@ def test_ros_sees_the_node_with_its_services_and_topics(call: Caller, service: S
         assert key == call.peer.key(DOMAIN, f"{NODE}/{name}", full)
         assert token[12:] == ["::,10:,:,:,,"]
         named.append(f"{NODE}/{name}")
-    topics = [("MP", "/diagnostics"), ("MS", f"{NODE}/body_wrench"), ("MP", f"{NODE}/tendons")]
+    topics = [
+        ("MP", "/diagnostics"),
+        ("MS", f"{NODE}/body_wrench"),
+        ("MP", f"{NODE}/tendons"),
+        ("MP", f"{NODE}/hand_wrenches"),
+    ]
     assert {*ends} == {*topics}
     assert service.ready["ros2"] == [*named, *(name for _, name in topics)]
 
@@ -266,11 +279,12 @@ def test_published_wrenches_get_set_points_with_their_stamp(
     answer = call("stream", "Stream", request=msgspec.json.encode(stream_request()).decode())
     first = msgspec.json.decode(answer["reply"])["body_wrench"]
     subscriber, got = call.subscribe(f"{NODE}/tendons", "sensor_msgs/msg/JointState")
+    wrenches, exerted = call.subscribe(f"{NODE}/hand_wrenches", "geometry_msgs/msg/WrenchStamped")
     stamp = 1_700_000_000_123_456_789
 
     def sees_set_points() -> bool:
         call.publish(first, stamp)
-        return not got.empty()
+        return not got.empty() and exerted.qsize() >= 8
 
     # a subscription takes its time to reach the service
     assert soon(sees_set_points)
@@ -280,6 +294,21 @@ def test_published_wrenches_get_set_points_with_their_stamp(
     called = call("set_points", "SetPoints", lost=[], **asked)["set_points"]
     for part in ("name", "effort", "position"):
         assert points[part] == called[part]
+    # what the world exerts on the robot balances the body: the body wrench is the sum of it
+    by_hand = {one["header"]["frame_id"]: one for one in [exerted.get() for _ in range(4)]}
+    assert all(one["header"]["stamp"] == points["header"]["stamp"] for one in by_hand.values())
+    total = np.zeros(6)
+    stance = wall_request()["stance"]
+    body = pose_of(stance["body"])
+    for hand in stance["hands"]:
+        turned, wrench = body.inverse() @ pose_of(hand["pose"]), by_hand[f"{hand['limb']}/H"]
+        force, moment = (
+            turned.rotation @ [wrench["wrench"][part][axis] for axis in "xyz"]
+            for part in ("force", "torque")
+        )
+        total += np.concatenate([force, moment + np.cross(turned.position, force)])
+    assert total == pytest.approx(first, abs=1e-3)
+
     # set-points that another session makes up are not the service's
     made_up = msgspec.json.decode(call("set_points", "SetPoints", lost=[], **asked)["reply"])
     forged = {"v": 1, "stream": answer["stream"], "number": 5, "time": 0.0, "age": 0.0}
@@ -307,6 +336,7 @@ def test_published_wrenches_get_set_points_with_their_stamp(
         lambda: "frame_id 'torso'; valid: 'B'" in state_with(diagnostics, 1, level=2)["message"]
     )
     subscriber.undeclare()
+    wrenches.undeclare()
 
 
 def test_a_node_that_closes_is_gone(router: str, call: Caller) -> None:
