@@ -10,7 +10,7 @@ from service.replies import HealthReply, LastFailure, ProcessHealth
 from service.ros2.health import service_state
 
 
-def health(state: str, failed: float | None = None) -> HealthReply:
+def health(state: str, failed: float | None) -> HealthReply:
     """Health with one process for questions, and a failure so long ago [s]."""
     process = ProcessHealth(pid=1, purpose="questions", state=state, resident=None)
     spare = ProcessHealth(pid=2, purpose="spare", state="idle", resident=None)
@@ -27,17 +27,19 @@ def health(state: str, failed: float | None = None) -> HealthReply:
 
 
 @pytest.mark.parametrize(
-    ("reply", "level", "message"),
+    ("state", "failed", "level", "message"),
     [
-        (health("working"), 0, "answers questions"),
-        (health("idle", failed=5.0), 1, "lost: plan"),
-        (health("idle", failed=3600.0), 0, "answers questions"),
+        ("working", None, 0, "answers questions"),
+        ("idle", 5.0, 1, "lost: plan"),
+        ("idle", 3600.0, 0, "answers questions"),
         # a spare one answers nothing
-        (health("starting", failed=5.0), 2, "no process is ready to answer questions"),
+        ("starting", 5.0, 2, "no process is ready to answer questions"),
     ],
 )
-def test_a_state_is_as_bad_as_the_worst_of_it(reply: HealthReply, level: int, message: str) -> None:
-    state = service_state(reply)
-    assert (state.level, state.message) == (level, message)
-    assert state.values["waiting: short"] == "2"
-    assert state.values["version"] == "unknown"
+def test_a_state_is_as_bad_as_the_worst_of_it(
+    state: str, failed: float | None, level: int, message: str
+) -> None:
+    found = service_state(health(state, failed))
+    assert (found.level, found.message) == (level, message)
+    assert found.values["waiting: short"] == "2"
+    assert found.values["version"] == "unknown"
