@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -21,85 +20,56 @@ from planner.search.wall import Ends, State, Wall
 __all__ = ["Ground", "Lifts"]
 
 
-@dataclass(frozen=True, eq=False)
 class Ground:
     """Reach, shifts and ends of climbs of a wall, whatever its hands hold.
 
-    Attributes
+    Parameters
     ----------
     wall : Wall
     ends : tuple of Ends
         Start and goal.
+
+    Attributes
+    ----------
+    reached : ndarray of bool, shape (P, B, L)
+        True where a limb reaches a placement from a body.
+    beside : ndarray of bool, shape (B, B)
+        True where the body may be shifted from one pose to another.
+    near : ndarray of int, shape (B, W)
+        Masks of ``beside``.
+    reach : ndarray of int, shape (P, L, W)
+        Masks of the bodies from which limbs reach placements.
+    candidates : tuple of ndarray of int
+        Placements that each limb reaches from each body, and the first of each, (B L + 1,).
+    end_masks : ndarray of int, shape (2, W)
+        Masks of the bodies at the start and at the goal.
+    fixed : ndarray of int, shape (2, L)
+        Placements of the limbs at the start and at the goal, −1 for any.
+    hops : ndarray, shape (2, B)
+        Shifts from each body to the nearest of the start and of the goal.
+    far : ndarray, shape (2, P, L)
+        Mean of the ``hops`` of the bodies from which limbs reach placements.
     """
 
-    wall: Wall
-    ends: tuple[Ends, Ends]
-
-    @cached_property
-    def reached(self) -> NDArray[np.bool_]:
-        """True where a limb reaches a placement from a body, shape (P, B, L)."""
-        return self.wall.reach.reached
-
-    @cached_property
-    def beside(self) -> NDArray[np.bool_]:
-        """True where the body may be shifted from one pose to another, shape (B, B)."""
-        count = len(self.wall.bodies)
-        found = np.zeros((count, count), dtype=bool)
-        first, second = np.asarray(self.wall.shifts, dtype=np.intp).reshape(-1, 2).T
-        found[first, second] = found[second, first] = True
-        return found
-
-    @cached_property
-    def near(self) -> Indices:
-        """Masks of `beside`, shape (B, W)."""
-        return _masks(self.beside)
-
-    @cached_property
-    def reach(self) -> Indices:
-        """Masks of the bodies from which limbs reach placements, shape (P, L, W)."""
-        count, bodies, limbs = self.reached.shape
-        flat = np.moveaxis(self.reached, 1, 2).reshape(count * limbs, bodies)
-        return _masks(flat).reshape(count, limbs, -1)
-
-    @cached_property
-    def candidates(self) -> tuple[Indices, Indices]:
-        """Placements that each limb reaches from each body, and the first of each, (B L + 1,)."""
-        by_body = np.moveaxis(self.reached, 0, 2)
-        counts = by_body.sum(axis=2).ravel()
-        return np.nonzero(by_body)[2].copy(), np.cumsum(np.append(0, counts))
-
-    @cached_property
-    def end_masks(self) -> Indices:
-        """Masks of the bodies at the start and at the goal, shape (2, W)."""
-        return _masks(np.array([end.bodies for end in self.ends], dtype=bool))
-
-    @cached_property
-    def fixed(self) -> Indices:
-        """Placements of the limbs at the start and at the goal, −1 for any, shape (2, L)."""
-        limbs = self.reached.shape[2]
-        rows = [[-1] * limbs if end.members is None else end.members for end in self.ends]
-        return np.array(rows, dtype=np.intp)
-
-    @cached_property
-    def hops(self) -> Array:
-        """Shifts from each body to the nearest of the start and of the goal, shape (2, B)."""
-        count = len(self.wall.bodies)
-        found = np.full((2, count), float(count))
-        for distance, end in zip(found, self.ends, strict=True):
-            at, hop = np.asarray(end.bodies, dtype=bool).copy(), 0
-            while at.any():
-                distance[at] = hop
-                at = self.beside[at].any(axis=0) & (distance == count)
-                hop += 1
-        return found
-
-    @cached_property
-    def far(self) -> Array:
-        """Mean of the `hops` of the bodies from which limbs reach placements, (2, P, L)."""
-        count = np.maximum(self.reached.sum(axis=1), 1)
-        found: Array = np.einsum("pbl,eb->epl", self.reached.astype(float), self.hops)
-        found /= count
-        return found
+    def __init__(self, wall: Wall, ends: tuple[Ends, Ends]) -> None:
+        self.wall, self.ends = wall, ends
+        self.reached = reached = wall.reach.reached
+        count, bodies, limbs = reached.shape
+        self.beside = np.zeros((bodies, bodies), dtype=bool)
+        first, second = np.asarray(wall.shifts, dtype=np.intp).reshape(-1, 2).T
+        self.beside[first, second] = self.beside[second, first] = True
+        self.near = _masks(self.beside)
+        flat = np.moveaxis(reached, 1, 2).reshape(count * limbs, bodies)
+        self.reach = _masks(flat).reshape(count, limbs, -1)
+        by_body = np.moveaxis(reached, 0, 2)
+        starts = np.cumsum(np.append(0, by_body.sum(axis=2).ravel()))
+        self.candidates: tuple[Indices, Indices] = np.nonzero(by_body)[2].copy(), starts
+        self.end_masks = _masks(np.array([end.bodies for end in ends], dtype=bool))
+        rows = [[-1] * limbs if end.members is None else end.members for end in ends]
+        self.fixed = np.array(rows, dtype=np.intp)
+        self.hops = np.array([_hops(self.beside, end) for end in ends])
+        total: Array = np.einsum("pbl,eb->epl", reached.astype(float), self.hops)
+        self.far = total / np.maximum(reached.sum(axis=1), 1)
 
     def of(self, body: int, limb: int) -> Indices:
         """Return the placements that a limb reaches from a body."""
@@ -150,6 +120,8 @@ class Lifts:
         State of each lift in a search.
     counts : ndarray of int, shape (B, L)
         Lifts of each body and limb in the air.
+    hashed : tuple of ndarray of int
+        Hash table of ``keys`` (`compiled_graph.hash_table`).
     """
 
     ground: Ground
@@ -164,6 +136,7 @@ class Lifts:
     keys: Indices
     nodes: NDArray[np.void]
     counts: Indices
+    hashed: tuple[Indices, Indices]
 
     @classmethod
     def passing(
@@ -194,7 +167,7 @@ class Lifts:
         LimitError
             If there are too many.
         """
-        from planner.search.compiled_graph import LIFT_NODE
+        from planner.search.compiled_graph import LIFT_NODE, hash_table
 
         count, bodies, limbs = ground.reached.shape
         found, left = list[Indices](), SEARCH_SETTINGS.most_lifts
@@ -232,6 +205,7 @@ class Lifts:
             keys=keys,
             nodes=np.zeros(len(order), dtype=LIFT_NODE),
             counts=counts,
+            hashed=hash_table(keys),
         )
 
     def __len__(self) -> int:
@@ -280,7 +254,7 @@ class Lifts:
             self.triples,
             self.members,
             self.starts,
-            *self._hashed,
+            *self.hashed,
             ground.near,
             ground.reach,
             placements,
@@ -342,11 +316,16 @@ class Lifts:
         far += ground.hops[end, self.bodies[lifts]]
         return far
 
-    @cached_property
-    def _hashed(self) -> tuple[Indices, Indices]:
-        from planner.search.compiled_graph import hash_table
 
-        return hash_table(self.keys)
+def _hops(beside: NDArray[np.bool_], end: Ends) -> Array:
+    """Return the shifts from each body to the nearest of an end, shape (B,)."""
+    found = np.full(len(beside), float(len(beside)))
+    at, hop = np.asarray(end.bodies, dtype=bool).copy(), 0
+    while at.any():
+        found[at] = hop
+        at = beside[at].any(axis=0) & (found == len(beside))
+        hop += 1
+    return found
 
 
 def _masks(table: NDArray[np.bool_]) -> Indices:
