@@ -21,8 +21,7 @@ not affine: they are sampled in the middle, and a parabola through the three val
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,40 +31,37 @@ from hand_models.wrench_spaces import WRENCH_SCALE
 from planner.motion import pose_between
 from planner.route.com_travel import mass_travel, turn_between
 from planner.route.held import HeldPosture, Posed, hold_with
-from planner.route.hold_rows import HoldRows
 
 __all__ = ["Passage"]
 
 
-@dataclass(frozen=True, eq=False)
 class Passage:
     """The way from one held posture to the next, with the same hands on the rock.
 
-    Attributes
+    Parameters
     ----------
     start, end : HeldPosture
     excess : float
         Utilisation that passive reactions may cost above the larger of both ends: how they settle
         is chosen for that.
+
+    Attributes
+    ----------
+    still : bool
+        True if neither the body nor a joint moves.
     """
 
-    start: HeldPosture
-    end: HeldPosture
-    excess: float = 0.02
-
-    @property
-    def turn(self) -> Array:
-        """Rotation vector of the body's turn, in B, shape (3,) [rad]."""
-        body = self.start.posed.body
-        return np.asarray(body.rotation.T @ turn_between(body, self.end.posed.body))
-
-    @cached_property
-    def still(self) -> bool:
-        """True if neither the body nor a joint moves."""
-        start, end = self.start.posed, self.end.posed
-        return start.body is end.body and all(
-            np.array_equal(at, end.angles[limb]) for limb, at in start.angles.items()
+    def __init__(self, start: HeldPosture, end: HeldPosture, excess: float = 0.02) -> None:
+        self.start, self.end = start, end
+        here, there, moving = start.posed, end.posed, end.posed.moving
+        self.still = here.body is there.body and all(
+            np.array_equal(at, there.angles[limb]) for limb, at in here.angles.items()
         )
+        # largest deviation of the moving hand's wrench from the straight line, in H
+        self._deviation = np.zeros(6) if moving is None else moving.deviation
+        self._rows = here.holding.rows
+        self._ball, self._box = self._off_by_mass(), self._off_by_hand()
+        self._settling = self._settled_by(excess)
 
     def posed(self, t: float) -> Posed:
         """Return the posture that is interpolated at a time t from 0 to 1."""
@@ -110,7 +106,8 @@ class Passage:
         posed : Posed
             The posture that is interpolated at that time, or one near it.
         """
-        return np.split(self._loads(t, posed), self._ends)
+        ends = np.cumsum([len(own) for own in self.start.loads])[:-1]
+        return np.split(self._loads(t, posed), ends)
 
     def _loads(self, t: float, posed: Posed) -> Array:
         y = _mixed(np.concatenate(self.start.loads), np.concatenate(self.end.loads), t)
@@ -123,7 +120,7 @@ class Passage:
         It is infinite if passive reactions cannot balance the deviation from the straight line.
         """
         ends = self.start.used, self.end.used
-        rows, changing = self._rows, self._changing
+        rows, changing = self._rows, self._changing()
         middle = self.posed(0.5)
         moving = [held.posed.moving for held in (self.start, self.end)]
         most = max(
@@ -168,18 +165,8 @@ class Passage:
             most = max(most, float(peaks.max(initial=0.0)))
         return most
 
-    @cached_property
-    def _ends(self) -> Array:
-        return np.cumsum([len(own) for own in self.start.loads])[:-1]
-
-    @property
-    def _rows(self) -> HoldRows:
-        """The rows of all hands, at the start."""
-        return self.start.posed.rows
-
-    @cached_property
     def _changing(self) -> NDArray[np.bool_]:
-        """True for limits whose rows change from the start to the end, shape (k,)."""
+        """Return True for limits whose rows change from the start to the end, shape (k,)."""
         here, there = self.start.prepared.hands.spaces, self.end.prepared.hands.spaces
         if here is there:
             return np.zeros(len(self._rows.used), dtype=bool)
@@ -194,26 +181,19 @@ class Passage:
         off = posed.body.position - self.start.posed.body.position
         return np.asarray(-wrench_transport(Pose(off, posed.body.rotation)) @ posed.needed)
 
-    @cached_property
-    def _ball(self) -> Array:
-        """Wrenches (6, 3) of the mass off its straight line; of a ball of directions."""
+    def _off_by_mass(self) -> Array:
+        """Return wrenches (6, 3) of the mass off its straight line; of a ball of directions."""
         route = self.start.posed.route
         if self.still:
             return np.zeros((6, 3))
         start, end = self.start.posed, self.end.posed
-        off = mass_travel(route.start.robot, route.load, self.turn, start.angles, end.angles)
+        turn = start.body.rotation.T @ turn_between(start.body, end.body)
+        off = mass_travel(route.start.robot, route.load, turn, start.angles, end.angles)
         pull = np.array(route.load.acceleration) - route.start.gravity
         return np.concatenate([np.zeros((3, 3)), off * skew(pull)])
 
-    @cached_property
-    def _deviation(self) -> Array:
-        """Largest deviation of the moving hand's wrench from the straight line, in H, (6,)."""
-        moving = self.end.posed.moving
-        return np.zeros(6) if moving is None else moving.deviation
-
-    @cached_property
-    def _box(self) -> Array:
-        """Wrenches (6, 6) of the moving hand off the straight line; each either way."""
+    def _off_by_hand(self) -> Array:
+        """Return wrenches (6, 6) of the moving hand off the straight line; each either way."""
         moving, posed = self.end.posed.moving, self.start.posed
         if moving is None or not self._deviation.any():
             return np.zeros((6, 6))
@@ -221,12 +201,11 @@ class Passage:
         about = Pose(pose.position - posed.body.position, pose.rotation)
         return wrench_transport(about) * self._deviation
 
-    @cached_property
-    def _settling(self) -> Array:
-        """The matrix K, shape (M, 6): change of the passive reactions with the wrench."""
+    def _settled_by(self, excess: float) -> Array:
+        """Return the matrix K, shape (M, 6): change of the passive reactions with the wrench."""
         rows, loads = self._rows, [np.concatenate(h.loads) for h in (self.start, self.end)]
         used = np.maximum(self.start.used, self.end.used)
-        room = [used.max() + self.excess - used]
+        room = [used.max() + excess - used]
         room.append(_room(*(rows.most - rows.hard @ y for y in loads)))
         each = np.abs(np.concatenate([rows.used, rows.hard]))
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -258,7 +237,7 @@ def _mixed(first: Array, last: Array, t: float) -> Array:
 def _used(posed: Posed, loads: Array) -> Array:
     """Return the utilisation of each limit row of a posture's hands at loads (M,)."""
     found, before = [], 0
-    for space in posed.prepared.hands.spaces:
+    for space in posed.holding.prepared.hands.spaces:
         own = loads[before : before + len(space.columns)]
         found.append((space.L @ own + space.l0) / space.s)
         before += len(own)

@@ -209,7 +209,8 @@ class _Planner:
         for k, body in enumerate(bodies, start=1):
             angles = {**first.angles, **{limb: way[k] for limb, way in ways.items()}}
             stage = body is goal
-            self._go(self._plan(replace(first, body=body, angles=angles), stage=stage), stage=stage)
+            posed = Posed(first.route, first.hands, body, angles, first.moving)
+            self._go(self._plan(posed, stage=stage), stage=stage)
 
     def _unload(self, limb: str) -> list[MovingHand]:
         """Take the load off the leaving hand; return its states while it opens."""
@@ -219,7 +220,8 @@ class _Planner:
         states = opening_states(limb, settled, space)
         others = tuple(hand for hand in held.posed.hands if hand.limb != limb)
         self._near = None
-        alone = self._plan(replace(held.posed, hands=others, moving=states[0]))
+        at = held.posed
+        alone = self._plan(Posed(at.route, others, at.body, at.angles, states[0]))
         loads = [*alone.loads[:h], closing_loads(settled, space), *alone.loads[h:]]
         self._go(hold_with(held.posed, loads))
         self._at = alone
@@ -271,16 +273,18 @@ class _Planner:
         posed, by_limb = self._at.posed, {hand.limb: hand for hand in self._at.posed.hands}
         by_limb[place.limb] = place
         order = [hand.limb for hand in self._route.start.hands]
-        whole = replace(posed, hands=tuple(by_limb[limb] for limb in order), moving=None)
-        prepared, h = whole.prepared, order.index(place.limb)
+        hands = tuple(by_limb[limb] for limb in order)
+        whole = Posed(posed.route, hands, posed.body, posed.angles)
+        prepared, h = whole.holding.prepared, order.index(place.limb)
         states = closing_states(place.limb, prepared.batch.hands[h], prepared.hands.spaces[h])
         states[0] = replace(states[0], deviation=np.abs(states[0].wrench))
         return whole, states
 
     def _load(self, whole: Posed, limb: str) -> None:
         """Load the hand on its new hold."""
-        h = whole.prepared.limbs.index(limb)
-        settled, space = whole.prepared.batch.hands[h], whole.prepared.hands.spaces[h]
+        prepared = whole.holding.prepared
+        h = prepared.limbs.index(limb)
+        settled, space = prepared.batch.hands[h], prepared.hands.spaces[h]
         alone = self._at.loads
         self._at = hold_with(whole, [*alone[:h], closing_loads(settled, space), *alone[h:]])
         self._near = None
@@ -328,7 +332,7 @@ class _Planner:
         robot, hands = self._route.start.robot, {hand.limb: hand.pose for hand in posed.hands}
         found = shift_postures(robot, hands, [body], posed.angles)
         angles = {**posed.angles, **{limb: each[-1] for limb, each in found.items()}}
-        return replace(posed, body=body, angles=angles)
+        return Posed(posed.route, posed.hands, body, angles, posed.moving)
 
     def _go(self, end: HeldPosture, *, stage: bool = False, halvings: int | None = None) -> None:
         """Append knots on the way to where the robot is held next."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from msgspec import structs
@@ -32,11 +33,28 @@ class NoPlanError(Exception):
     """Error: the hands cannot hold the robot in a posture; the message says why."""
 
 
-@dataclass(frozen=True, eq=False)
+class HoldingHands(NamedTuple):
+    """The hands that hold the robot in a posture.
+
+    Attributes
+    ----------
+    prepared : PreparedStance
+        Their stance, prepared for the solver.
+    recovery : LoadRecovery
+        Conversion of their loads to a plan's numbers.
+    rows : HoldRows
+        Their rows; moments about the body's origin.
+    """
+
+    prepared: PreparedStance
+    recovery: LoadRecovery
+    rows: HoldRows
+
+
 class Posed:
     """A robot's posture in a climb, with its hands on the rock, and perhaps one that moves.
 
-    Attributes
+    Parameters
     ----------
     route : Route
         Load, limits and objective.
@@ -46,59 +64,64 @@ class Posed:
         Pose of the body frame B in W.
     angles : mapping of str to ndarray, shape (n,)
         Joint angles of every limb [rad].
-    moving : MovingHand or None
+    moving : MovingHand, optional
         The hand that moves.
+    posture : Posture, optional
+        Joint torques and weight of the robot at the joint angles, where they are known.
+    known : HoldingHands, optional
+        The same hands beside another state of the moving hand.
+
+    Attributes
+    ----------
+    question : Question
+        What is asked of the hands that hold the robot.
+    needed : ndarray, shape (6,)
+        Wrench that these hands must supply, in B [N, N·m].
+    hand_poses : dict of str to Pose
+        Pose of each limb's hand frame H in B: where its hand is held, or its joints put it.
     """
 
-    route: Route
-    hands: tuple[HandOnHold, ...]
-    body: Pose
-    angles: Mapping[str, Array]
-    moving: MovingHand | None = None
-
-    @cached_property
-    def _whole(self) -> Question:
-        """The question without a hand that moves."""
-        route, start = self.route, self.route.start
-        on_rock = {hand.limb for hand in self.hands}
+    def __init__(
+        self,
+        route: Route,
+        hands: tuple[HandOnHold, ...],
+        body: Pose,
+        angles: Mapping[str, Array],
+        moving: MovingHand | None = None,
+        posture: Posture | None = None,
+        known: HoldingHands | None = None,
+    ) -> None:
+        self.route, self.hands, self.body, self.angles = route, hands, body, angles
+        self.moving, self._known, start = moving, known, route.start
+        on_rock = {hand.limb: body.inverse() @ hand.pose for hand in hands}
         caps = {limb: cap for limb, cap in route.limits.per_hand.items() if limb in on_rock}
-        stance = Stance(self.hands, self.body, start.gravity, start.robot, dict(self.angles))
+        stance = Stance(hands, body, start.gravity, start.robot, dict(angles))
         limits = structs.replace(route.limits, per_hand=caps, tension_change=None)
-        return Question(stance, load=route.load, limits=limits, objective=route.objective)
-
-    @cached_property
-    def posture(self) -> Posture:
-        """Joint torques and weight of the robot at the joint angles."""
-        return posture_at(self._whole, self.angles)
-
-    @cached_property
-    def needed(self) -> Array:
-        """Wrench that the hands must supply that hold the robot, in B, shape (6,) [N, N·m]."""
-        weight, moving = self._whole.needed_wrench(self.posture.weights), self.moving
-        if moving is None or not moving.on_rock:
-            return weight
-        return np.asarray(weight + wrench_transport(self.hand_poses[moving.limb]) @ moving.wrench)
-
-    @cached_property
-    def prepared(self) -> PreparedStance:
-        """The stance of the hands that hold the robot, prepared for the solver."""
-        question, moving = self._whole, self.moving
+        question = Question(stance, load=route.load, limits=limits, objective=route.objective)
+        self.posture = posture_at(question, angles) if posture is None else posture
+        self.hand_poses = start.robot.hand_poses(angles) | on_rock
+        self.needed = question.needed_wrench(self.posture.weights)
         if moving is not None and moving.on_rock:
+            carried = wrench_transport(self.hand_poses[moving.limb]) @ moving.wrench
+            self.needed = np.asarray(self.needed + carried)
             question = replace(question, body_wrench=self.needed)
-        parts = assemble(question, self.posture, self.needed)
-        return PreparedStance(question, self.posture, *parts, self.needed)
+        self.question = question
 
     @cached_property
-    def recovery(self) -> LoadRecovery:
-        """Conversion of the hands' loads to a plan's numbers."""
-        hands = self.prepared.hands
-        return LoadRecovery(self.prepared.batch, hands.spaces, hands.scaled)
-
-    @cached_property
-    def rows(self) -> HoldRows:
-        """The rows of the hands that hold the robot; moments about the body's origin."""
+    def holding(self) -> HoldingHands:
+        """The hands that hold the robot, prepared for the solver."""
+        question, posture, known = self.question, self.posture, self._known
+        if known is not None:
+            batch, hands = known.prepared.batch, known.prepared.hands.turned(self.needed)
+            prepared = PreparedStance(question, posture, batch, hands, self.needed)
+            return known._replace(prepared=prepared)
+        parts = batch, hands = assemble(question, posture, self.needed)
         poses = [hand.pose for hand in self.hands]
-        return HoldRows.of(self.prepared.hands.spaces, poses, self.body.position)
+        return HoldingHands(
+            PreparedStance(question, posture, *parts, self.needed),
+            LoadRecovery(batch, hands.spaces, hands.scaled),
+            HoldRows.of(hands.spaces, poses, self.body.position),
+        )
 
     def beside(self, moving: MovingHand | None, angles: Array | None = None) -> Posed:
         """Return the posture with another state of the moving hand, while all others hold still.
@@ -106,21 +129,10 @@ class Posed:
         ``angles``, shape (n,), are new joint angles of its limb [rad]. What the others can carry is
         not computed again.
         """
-        joints = self.angles
+        joints, posture = self.angles, self.posture if angles is None else None
         if angles is not None and moving is not None:
             joints = {**joints, moving.limb: angles}
-        found = replace(self, moving=moving, angles=joints)
-        if angles is None:
-            found.__dict__["posture"] = self.posture
-        question = found._whole
-        if moving is not None and moving.on_rock:
-            question = replace(question, body_wrench=found.needed)
-        before = self.prepared
-        found.__dict__.update(recovery=self.recovery, rows=self.rows)
-        found.__dict__["prepared"] = PreparedStance(
-            question, found.posture, before.batch, before.hands.turned(found.needed), found.needed
-        )
-        return found
+        return Posed(self.route, self.hands, self.body, joints, moving, posture, self.holding)
 
     def cap_use(self, beside: Array) -> float:
         """Return the share of the cap on its force that the moving hand has on its rock.
@@ -136,59 +148,58 @@ class Posed:
     @property
     def idle(self) -> dict[str, JointLoads]:
         """Joint loads of the limbs whose hands do not hold the robot, by limb."""
-        return self.posture.idle(self._whole.stance)
-
-    @cached_property
-    def hand_poses(self) -> dict[str, Pose]:
-        """Pose of each limb's hand frame H in B: where its hand is held, or its joints put it."""
-        found, into_body = self.route.start.robot.hand_poses(self.angles), self.body.inverse()
-        return found | {hand.limb: into_body @ hand.pose for hand in self.hands}
+        return self.posture.idle(self.question.stance)
 
 
-@dataclass(frozen=True, eq=False)
 class HeldPosture:
     """Verified loads of a posture.
 
-    Attributes
+    Parameters
     ----------
     posed : Posed
-    prepared : PreparedStance
-        The stance of the hands that hold the robot.
-    loads : tuple of ndarray, shape (m,)
-        Loads y of each of these hands [N].
+    loads : sequence of ndarray, shape (m,)
+        Loads y of each hand that holds the robot [N].
     arrays : PlanArrays
         Their numbers.
     used : ndarray
         Utilisation of each limit row of their sets, hand by hand.
-    solution : Solution or None
+    solution : Solution, optional
         Of the solver, as a start for others.
+
+    Attributes
+    ----------
+    prepared : PreparedStance
+        The stance of the hands that hold the robot.
+    wrenches : dict of str to ndarray, shape (6,)
+        Wrench of each hand on the rock, in its H [N, N·m]; zero in the air.
+    most_used : tuple of float and LimitName
+        Largest utilisation of all limits, and the limit that has it.
     """
 
-    posed: Posed
-    prepared: PreparedStance
-    loads: tuple[Array, ...]
-    arrays: PlanArrays
-    used: Array
-    solution: Solution | None = None
+    def __init__(
+        self,
+        posed: Posed,
+        loads: Sequence[Array],
+        arrays: PlanArrays,
+        used: Array,
+        solution: Solution | None = None,
+    ) -> None:
+        self.posed, self.prepared, self.loads = posed, posed.holding.prepared, tuple(loads)
+        self.arrays, self.used, self.solution = arrays, used, solution
+        self.wrenches = {limb: np.zeros(6) for limb in posed.route.start.robot.limbs}
+        self.wrenches |= dict(zip(self.prepared.limbs, arrays.wrenches, strict=True))
+        if posed.moving is not None:
+            self.wrenches[posed.moving.limb] = posed.moving.wrench
+        self.most_used = max(self._largest(), key=lambda each: each[0])
 
-    @cached_property
-    def wrenches(self) -> dict[str, Array]:
-        """Wrench of each hand on the rock, in its H, shape (6,) [N, N·m]; zero in the air."""
-        found = {limb: np.zeros(6) for limb in self.posed.route.start.robot.limbs}
-        found |= dict(zip(self.prepared.limbs, self.arrays.wrenches, strict=True))
-        if self.posed.moving is not None:
-            found[self.posed.moving.limb] = self.posed.moving.wrench
-        return found
-
-    @cached_property
+    @property
     def joint_torque(self) -> dict[str, Array]:
         """Joint torques of every limb, shape (n,) [N·m]."""
         joints = self.posed.posture.joints
         return {limb: own.torques(self.wrenches[limb]) for limb, own in joints.items()}
 
-    @cached_property
-    def idle(self) -> list[tuple[float, LimitName]]:
-        """Utilisation of the joints of limbs whose hand is not in the set of the stance."""
+    def _idle(self) -> list[tuple[float, LimitName]]:
+        """Return the utilisation of the joints of limbs whose hand is not in the set."""
         found = list[tuple[float, LimitName]]()
         for limb, own in self.posed.idle.items():
             driven = own.driven
@@ -200,9 +211,8 @@ class HeldPosture:
             ]
         return found
 
-    @cached_property
-    def most_used(self) -> tuple[float, LimitName | None]:
-        """Largest utilisation of all limits, and the limit that has it."""
+    def _largest(self) -> list[tuple[float, LimitName | None]]:
+        """Return the utilisations among which the largest of all is, and their limits."""
         limits = [
             (limb, row)
             for limb, space in zip(self.prepared.limbs, self.prepared.hands.spaces, strict=True)
@@ -211,14 +221,14 @@ class HeldPosture:
         most, i = float(self.used.max()), most_used(self.used)
         found: list[tuple[float, LimitName | None]] = [
             (max(most, 0.0), limit_name(*limits[i])),
-            *self.idle,
+            *self._idle(),
         ]
         moving = self.posed.moving
         if moving is not None and moving.on_rock:
             found.append((moving.utilisation, moving.limiting))
             cap = LimitName(moving.limb, None, None, FORCE_CAP)
             found.append((self.posed.cap_use(np.zeros(3)), cap))
-        return max(found, key=lambda each: each[0])
+        return found
 
     @property
     def utilisation(self) -> float:
@@ -277,9 +287,9 @@ def hold_as_planned(
         If there is no plan within the cap on the utilisation, or the moving limb's joints or
         fingers are overloaded.
     """
-    prepared = posed.prepared
+    prepared, recovery, _ = posed.holding
     check = Check(prepared.question, prepared.batch, prepared.where)
-    checks = Checks(check, posed.recovery, idle_joints(prepared))
+    checks = Checks(check, recovery, idle_joints(prepared))
     asked = _pressing(prepared, press) if press > 0.0 else prepared
     if objective is not None:
         asked = replace(asked, question=replace(asked.question, objective=objective))
@@ -290,10 +300,8 @@ def hold_as_planned(
         or answer.utilisation > prepared.question.limits.utilisation + CAP_SLACK
     ):
         raise NoPlanError(found.reason or "no plan passes the checks")
-    held = HeldPosture(
-        posed, prepared, answer.solution.loads, answer.arrays, answer.used, answer.solution
-    )
-    return _checked(held)
+    solution = answer.solution
+    return _checked(HeldPosture(posed, solution.loads, answer.arrays, answer.used, solution))
 
 
 def _pressing(prepared: PreparedStance, press: float) -> PreparedStance:
@@ -317,17 +325,15 @@ def hold_with(posed: Posed, loads: Sequence[Array]) -> HeldPosture:
     NoPlanError
         If the loads do not pass the checks.
     """
-    prepared = posed.prepared
-    arrays, used, _ = posed.recovery.read(loads)
-    held = HeldPosture(posed, prepared, tuple(loads), arrays, used)
+    prepared, recovery, _ = posed.holding
+    arrays, used, _ = recovery.read(loads)
     # the check knows of no wrench of a hand beside those of the stance
-    air = replace(posed, moving=None)
+    alone = HeldPosture(posed.beside(None), loads, arrays, used)
     check = Check(prepared.question, prepared.batch, prepared.where)
-    alone = replace(held, posed=air)
     wrong = check.problems(arrays, alone.utilisation, prepared.wrench)
     if wrong:
         raise NoPlanError(f"the loads do not pass the checks: {wrong[0]}")
-    return _checked(held)
+    return _checked(HeldPosture(posed, loads, arrays, used))
 
 
 def _checked(held: HeldPosture) -> HeldPosture:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -91,7 +90,7 @@ class HandKnot:
     winch_angles: Array
     wrench: Array
 
-    @cached_property
+    @property
     def wrench_in_world(self) -> Array:
         """Wrench of the rock on the hand, in W about its origin, shape (6,) [N, N·m]."""
         return -(wrench_transport(self.pose) @ self.wrench)
