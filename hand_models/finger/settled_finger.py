@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final, Literal
 
 import numpy as np
@@ -110,38 +109,38 @@ class SettledFinger:
     model: FingerModel
     contacts: tuple[Contact, ...]
 
-    @cached_property
+    @property
     def touching(self) -> tuple[bool, ...]:
         """True for each phalanx whose tile is on rock (contact state ``face`` or ``edge``)."""
         return tuple(contact.kind in ("face", "edge") for contact in self.contacts)
 
-    @cached_property
+    @property
     def engagement(self) -> Array:
         """Spine engagement: share of each tile's spines on the rock, shape (3,)."""
         shares = np.array([contact.engagement for contact in self.contacts])
         return np.where(self.touching, shares, 0.0)
 
-    @cached_property
+    @property
     def bearing(self) -> tuple[int, ...]:
         """Indices of the phalanges with a contact: pressed on rock, or held to rock by spines."""
         return tuple(i for i, contact in enumerate(self.contacts) if contact.kind != "none")
 
-    @cached_property
+    @property
     def free(self) -> tuple[int, ...]:
         """Indices of the joints that contacts support; with a contact, as many as in `bearing`."""
         return tuple(i for i, contact in enumerate(self.contacts) if contact.stop is None)
 
-    @cached_property
+    @property
     def joint_angles(self) -> Array:
         """q, angle of each joint relative to the phalanx before it, shape (3,) [rad]."""
         return np.diff([0.0, *(contact.angle for contact in self.contacts)])
 
-    @cached_property
+    @property
     def points(self) -> Array:
         """Places (x, z) of the contacts in the finger frame F, shape (3, 2) [m]."""
         return np.array([contact.point(self.model.tile_height) for contact in self.contacts])
 
-    @cached_property
+    @property
     def directions(self) -> Array:
         """Unit vectors (x, z) in F opposite to tiles' drag, shape (3, 2): u turned by ``tilt``."""
         angles = [contact.angle + contact.tilt for contact in self.contacts]
@@ -204,9 +203,9 @@ class SettledFinger:
             If the contacts cannot balance the joints that are not at a limit.
         """
         normals = np.zeros_like(shears)
-        if self.bearing:
+        free, bearing = list(self.free), list(self.bearing)
+        if bearing:
             arms, rest = self._joint_balance(shears, base_tile)
-            free, bearing = list(self.free), list(self.bearing)
             share = np.array([self.contacts[j].bearing_share for j in bearing])[:, None]
             A = arms[np.ix_(free, bearing)]
             A = share * A + np.diag((1.0 - share[:, 0]) * np.diag(A))

@@ -232,7 +232,7 @@ class SettledHand:
         """Posture of each finger, in the order of `FINGERS`."""
         return self.postures.fingers(self.hand.finger)
 
-    @cached_property
+    @property
     def closures(self) -> tuple[str, ...]:
         """Closure of each finger, in the order of `FINGERS`.
 
@@ -255,21 +255,21 @@ class SettledHand:
                 words.append("curled" if balance in stops else "stopped")
         return tuple(words)
 
-    @cached_property
+    @property
     def touching(self) -> Array:
         """True for tiles that are on rock (contact ``face`` or ``edge``), shape (n,)."""
         return np.array([tile.contact in ("face", "edge") for tile in self.tiles])
 
-    @cached_property
+    @property
     def lateral_shares(self) -> Array:
         """Share of its finger's lateral reaction that each tile carries, shape (n,).
 
         The tile's spine engagement φ over the sum of φ of the finger's tiles.
         """
-        sums = np.where(self._whole_tiles > 0.0, self._whole_tiles, 1.0)
-        return np.asarray(self.engagement / sums[self.finger_of])
+        sums = self._whole_tiles
+        return np.asarray(self.engagement / np.where(sums > 0.0, sums, 1.0)[self.finger_of])
 
-    @cached_property
+    @property
     def limit_shares(self) -> Array:
         """Share of a whole tile's strength that limits each tile's load, shape (n,).
 
@@ -281,7 +281,7 @@ class SettledHand:
         more = np.maximum(least - share, 0.0) ** 2 / (2.0 * least)
         return np.where(share > 0.0, share + more, 0.0)
 
-    @cached_property
+    @property
     def drag_allowances(self) -> Array:
         """Force beyond friction by which each tile may be dragged backwards, shape (n,) [N].
 
@@ -289,12 +289,12 @@ class SettledHand:
         """
         return self.surface.shear_limit * (self.limit_shares - self.engagement)
 
-    @cached_property
+    @property
     def lateral_limits(self) -> Array:
         """Lateral strength of each finger, the sum over its tiles by engagement, shape (4,) [N]."""
         return self.surface.lateral_limit * self._whole_tiles
 
-    @cached_property
+    @property
     def _whole_tiles(self) -> Array:
         """Number of whole tiles that each finger's spines on rock make, Σ φ, shape (4,)."""
         return np.bincount(self.finger_of, self.engagement, len(FINGERS)).astype(float)
@@ -307,7 +307,7 @@ class SettledHand:
         """
         return 1.0 if self.surface.name == FITTED_SURFACE else self.hand.rock_stiffness_ratio
 
-    @cached_property
+    @property
     def palm_shear_stiffness(self) -> float:
         """Stiffness of the palm's shear toward −x [N/m].
 
@@ -320,17 +320,17 @@ class SettledHand:
             found += share * shear_stiffness(contacts, hand.palm_spring, *rubs)
         return found
 
-    @cached_property
+    @property
     def nails(self) -> Array:
         """True for nails that hook, shape (n,)."""
         return np.array([tile.contact == NAIL for tile in self.tiles])
 
-    @cached_property
+    @property
     def holding(self) -> Array:
         """True for tiles that are on rock and for nails that hook, shape (n,)."""
         return np.logical_or(self.touching, self.nails)
 
-    @cached_property
+    @property
     def rock_ends(self) -> tuple[float, ...]:
         """Distance from each finger's joint to the hold's border in the finger's plane [m].
 

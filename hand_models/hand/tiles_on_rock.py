@@ -6,7 +6,7 @@ For palms: which tiles are engaged, and the strength of these together.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -35,7 +35,6 @@ TILE_NAMES: Final = _names()
 """Finger and phalanx of each tile as they are worked out: first the base tiles, last the nails."""
 
 
-@cache
 def _order(*, nails: bool) -> tuple[Indices, Indices]:
     """Return the order of the tiles of hands that cling or do not, and the finger of each.
 
@@ -132,17 +131,18 @@ def hand_tiles(tiles: Array, nails: Mapping[int, Nails]) -> list[HandTiles]:
     nails : mapping of int to Nails
         Nails by the index of their hand.
     """
-    gripping = tiles.take(_order(nails=False)[0], axis=1)
-    made = _each_hand(gripping, nails=False)
+    made = _each_hand(tiles, nails=False)
     for i, each in nails.items():
         if len(each.tiles):
-            clinging = np.concatenate([tiles[i], each.tiles]).take(_order(nails=True)[0], axis=0)
+            clinging = np.concatenate([tiles[i], each.tiles])
             made[i : i + 1] = _each_hand(clinging[None], nails=True)
     return made
 
 
-def _each_hand(numbers: Array, *, nails: bool) -> list[HandTiles]:
+def _each_hand(unordered: Array, *, nails: bool) -> list[HandTiles]:
     """Return the tiles of hands that all cling, or all do not, from their numbers."""
+    order, finger_of = _order(nails=nails)
+    numbers = unordered.take(order, axis=1)
     count, tiles, _ = numbers.shape
     numbers.setflags(write=False)
     column = TILE_COLUMNS
@@ -151,7 +151,7 @@ def _each_hand(numbers: Array, *, nails: bool) -> list[HandTiles]:
     axes = numbers[..., column.axes].reshape(count, tiles, 3, 3)
     loads = numbers[..., column.shear.start : column.normal.stop].reshape(count, tiles, 2, 2)
     return [
-        HandTiles(_named(codes[i : i + tiles], nails), _order(nails=nails)[1], *of_hand)
+        HandTiles(_named(codes[i : i + tiles], nails), finger_of, *of_hand)
         for i, *of_hand in zip(
             range(0, count * tiles, tiles),
             *(numbers[..., column.position], axes, loads, numbers[..., column.engagement]),

@@ -25,18 +25,25 @@ class Boundary:
     pieces : sequence of ndarray, shape (n, 2)
         Points (s, t) in order, each different from the one before it; a closed piece ends where it
         begins. Rock ends where an open piece ends [m].
+
+    Attributes
+    ----------
+    places : ndarray, shape (n, 2)
+        Points of the pieces, one after another [m].
+    ends : ndarray of int
+        Index at which each piece ends.
     """
 
     def __init__(self, pieces: Sequence[Array]) -> None:
-        self._places, self._ends = strung(pieces)
+        self.places, self.ends = strung(pieces)
 
     @cached_property
     def runs(self) -> tuple[Array, Indices, Indices]:
         """Vertices (n, 2) [m], and indices (n,) of the first and last of each one's polyline."""
-        lengths = np.diff(self._ends, prepend=0)
-        bounds = self._ends - lengths, self._ends - 1
+        lengths = np.diff(self.ends, prepend=0)
+        bounds = self.ends - lengths, self.ends - 1
         first, last = np.repeat(bounds, lengths, axis=1)
-        return self._places, first, last
+        return self.places, first, last
 
     def clearances(self, points: Complexes) -> Array:
         """Return the signed distance of each point s + i t from the rock [m].
@@ -46,14 +53,14 @@ class Boundary:
         from hand_models.sections.compiled_polylines import signed_distances
 
         places = np.ascontiguousarray(points).view(float).reshape(-1, 2)
-        return signed_distances(self._places, self._ends, places).reshape(points.shape)
+        return signed_distances(self.places, self.ends, places).reshape(points.shape)
 
     def normal(self, point: complex) -> complex:
         """Return the unit normal, out of the rock, of the segment nearest a point."""
         from hand_models.sections.compiled_polylines import nearest_segments
 
-        at, _, _ = nearest_segments(self._places, self._ends, np.array([[point.real, point.imag]]))
-        (s, t), after = self._places[at[0] : at[0] + 2]
+        at, _, _ = nearest_segments(self.places, self.ends, np.array([[point.real, point.imag]]))
+        (s, t), after = self.places[at[0] : at[0] + 2]
         step = complex(*after) - complex(s, t)
         return -1j * step / abs(step)
 

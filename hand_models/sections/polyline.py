@@ -10,13 +10,12 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, Indices
-from hand_models.sections.boundary import Boundary, strung
+from hand_models.base import Array
+from hand_models.sections.boundary import Boundary
 from hand_models.sections.first_contact import TurningFaces
 from hand_models.sections.section import Complexes, Face, Flags, Rest, Section, Vector2
 
@@ -57,18 +56,8 @@ class PolylineSection(Section):
     """
 
     def __init__(self, pieces: Sequence[Array], *, faceted: bool = False) -> None:
-        self.pieces = tuple(pieces)
+        self.pieces, self.boundary = tuple(pieces), Boundary(pieces)
         self.faceted = faceted
-
-    @cached_property
-    def boundary(self) -> Boundary:
-        """The polylines, prepared for searches when first used; `highest` does not need it."""
-        return Boundary(self.pieces)
-
-    @cached_property
-    def _strung(self) -> tuple[Array, Indices]:
-        """Points of the pieces, one after another, and the index at which each piece ends."""
-        return strung(self.pieces)
 
     def rest(self, joint: complex, face: Face, low: float, high: float) -> Rest | None:
         found = self.rests(np.array([joint]), face, low, high)
@@ -126,4 +115,5 @@ class PolylineSection(Section):
         """
         from hand_models.sections.compiled_polylines import highest_rock
 
-        return highest_rock(*self._strung, np.ascontiguousarray(low), np.ascontiguousarray(high))
+        places, ends = self.boundary.places, self.boundary.ends
+        return highest_rock(places, ends, np.ascontiguousarray(low), np.ascontiguousarray(high))

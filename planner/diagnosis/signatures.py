@@ -107,9 +107,8 @@ def _of_finger(
     before = tendon.closed(tension, loads[:, 0] + tension * loads[:, 1])
     stiffness = np.array(tendon.contact_stiffness) + tendon.spring_stiffness
     give = float((tendon.pulley_ratio**2 / stiffness).sum()) / radius
-    for i, t in enumerate(own.tolist()):
-        if not hand.touching[t]:
-            continue
+    for i in np.flatnonzero(hand.touching[own]).tolist():
+        t = int(own[i])
         lost = slipped_hand(hand, [t])
         drags = lost.loads[t, 0] if lost.tiles[t].contact == SLIPPED_TILE else np.zeros(2)
         tensions, turns = [], []

@@ -228,12 +228,12 @@ def idle_preloads(prepared: PreparedStance) -> tuple[str, ...]:
     for limb, hand, wrist in zip(prepared.limbs, hands, wrists, strict=True):
         if wrist is None or wrist.driven:
             continue
-        needs = []
-        for t in np.flatnonzero(hand.touching):
+        needs, allowances = [], hand.drag_allowances.tolist()
+        for t in np.flatnonzero(hand.touching).tolist():
             finger = int(hand.finger_of[t])
             drag = hand.loads[t, 0] + hand.surface.friction * hand.loads[t, 1]
             at_zero, per_newton = (float(value) for value in drag)
-            at_zero += float(hand.drag_allowances[t])
+            at_zero += allowances[t]
             shear = at_zero + per_newton * float(wrist.hand.preload[finger])
             if shear < -1e-3 and per_newton > 0.0:  # [N] less does not count
                 needs.append((-at_zero / per_newton, finger, hand.tiles[t].phalanx))

@@ -126,8 +126,8 @@ class Recovery:
         self._places = {
             (limb, tile.finger, tile.phalanx): (h, t)
             for h, (limb, hand) in enumerate(zip(prepared.limbs, prepared.batch.hands, strict=True))
-            for t, tile in enumerate(hand.tiles)
-            if hand.touching[t]
+            for t, (tile, on_rock) in enumerate(zip(hand.tiles, hand.touching, strict=True))
+            if on_rock
         }
         self._pattern = _pattern(data)
         # each tile alone, and as many losses of several

@@ -38,7 +38,7 @@ class MaxReliability(Objective):
         at = 0
         for hand, space, start in zip(batch.hands, sets.spaces, batch.places.first, strict=True):
             names: dict[tuple[str | None, str | None], int] = {
-                tile[:2]: start + i for i, tile in enumerate(hand.tiles) if hand.touching[i]
+                hand.tiles[i][:2]: start + i for i in np.flatnonzero(hand.touching).tolist()
             }
             for i, row in enumerate(space.rows[: len(space.s)]):
                 place = names.get((row.finger, row.phalanx))
