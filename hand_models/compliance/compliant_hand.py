@@ -286,11 +286,8 @@ class CompliantHands:
         counts, place = np.bincount(of), np.arange(len(of)) - first[of]
         self._tiles = of * counts.max() + place
         self._phalanges = np.flatnonzero(place >= counts[of] - len(PHALANGES))
-
-    @cached_property
-    def _fingers(self) -> CompliantFingers:
-        fingers = [finger for hand in self.hands for finger in hand.fingers]
-        return CompliantFingers(fingers, self.hands[0].scheme)
+        fingers = [finger for hand in hands for finger in hand.fingers]
+        self._fingers = CompliantFingers(fingers, hands[0].scheme)
 
     def loads(self, twists: Sequence[Numbers], tensions: Sequence[Numbers]) -> list[HandLoads]:
         """Return the loads of each hand at m twists of its wrist.

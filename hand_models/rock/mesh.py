@@ -90,6 +90,7 @@ class Mesh(OutlinedHold):
         go_on()
         self.triangles = without_spikes(wound, table.scalar("scan", "spike_ratio"))
         go_on()
+        self.cells = TriangleCells(self.triangles)
         self.nbytes = sum(part.nbytes for part in self.triangles)
         if not anywhere:
             self.check_place()
@@ -179,11 +180,6 @@ class Mesh(OutlinedHold):
         axes, reach = np.array([skew(s) @ t, s, t]), self._scale.reach
         beside, middle = np.array([half, reach, reach]), axes @ origin
         return self.cells.within(axes, middle - beside, middle + beside)
-
-    @cached_property
-    def cells(self) -> TriangleCells:
-        """Spatial index of the repaired mesh."""
-        return TriangleCells(self.triangles)
 
     def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
         """Cast a ray: return the distance from a point, along a direction, at which rock begins.

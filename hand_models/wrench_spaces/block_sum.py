@@ -95,41 +95,31 @@ class BlockSum:
         V, the wrench per unit of each load.
     blocks : sequence of Block
         Blocks of the wrench space; each column is in one block at most.
+
+    Attributes
+    ----------
+    axes : tuple of ndarray, shapes (r, 6), (r,)
+        Axes of the coordinates in which facets and vertices are found (by singular values):
+        orthonormal directions of the affine hull, in scaled wrenches, and the reach, the size of
+        the blocks' edges along each of them [N]. A coordinate is the product with a direction,
+        divided by the reach.
     """
 
     def __init__(self, origin: Array, generators: Array, blocks: Sequence[Block]) -> None:
         self.origin, self.generators, self.blocks = origin, generators, blocks
-
-    @cached_property
-    def _summands(self) -> tuple[Summand, ...]:
-        """The blocks' images that are more than a point, about `base`."""
-        summands = []
-        for columns, vertices, *_ in self.blocks:
-            image = (vertices @ self.generators[:, columns].T) * WRENCH_SCALE
-            summands.append(extreme_points(image, len(columns)))
-        return tuple(summands)
+        images = [
+            ((vertices @ generators[:, columns].T) * WRENCH_SCALE, len(columns))
+            for columns, vertices, *_ in blocks
+        ]
+        self._summands = [extreme_points(*each) for each in images]
+        edges = [s.points[1:] - s.points[0] for s in self._summands if s.dimension]
+        self.axes = affine_hull(np.vstack([np.zeros((0, 6)), *edges]))
 
     @property
     def base(self) -> Array:
         """A scaled wrench of the set, shape (6,) [N]: the origin of coordinates along `axes`."""
         start = self.origin * WRENCH_SCALE
         return np.asarray(sum((summand.points[0] for summand in self._summands), start=start))
-
-    @cached_property
-    def axes(self) -> tuple[Array, Array]:
-        """Axes of the coordinates in which facets and vertices are found (by singular values).
-
-        A coordinate is the product with a direction, divided by the reach.
-
-        Returns
-        -------
-        directions : ndarray, shape (r, 6)
-            Orthonormal directions of the affine hull, in scaled wrenches.
-        reach : ndarray, shape (r,)
-            Size of the blocks' edges along each direction [N].
-        """
-        edges = [s.points[1:] - s.points[0] for s in self._summands if s.dimension]
-        return affine_hull(np.vstack([np.zeros((0, 6)), *edges]))
 
     @property
     def sizes(self) -> Sizes:
@@ -219,7 +209,7 @@ class BlockSum:
             return facets(parts, r, self.rounding)
         return Facets(*hull_facets(sums(parts)))
 
-    @cached_property
+    @property
     def vertices(self) -> Array:
         """Vertices of the sum, shape (n, r), in coordinates along `axes` about `base`.
 

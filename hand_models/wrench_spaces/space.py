@@ -169,17 +169,6 @@ class WrenchSpace:
             for columns, rows in zip(groups, mine, strict=True)
         )
 
-    @cached_property
-    def _blocks(self) -> tuple[Block, ...]:
-        """The polytope of each block."""
-        blocks = []
-        for columns, A, b in self._coupled:
-            vertices, facets = polytope(A, b)
-            if not len(vertices):
-                raise self._empty(columns)
-            blocks.append(Block(columns, vertices, A[facets], b[facets]))
-        return tuple(blocks)
-
     @property
     def _most_rows(self) -> int:
         """Rows of the largest block of more than two columns; zero without one."""
@@ -197,7 +186,7 @@ class WrenchSpace:
             return self.A, self.b
         wide = len(self.s) - len(self.D), len(self.s)
         A, b = [self.L[slice(*wide)]], [self.b[slice(*wide)]]
-        for block in self._blocks:
+        for block in self._sum.blocks:
             A.append(np.zeros((len(block.b), len(self.columns))))
             A[-1][:, block.columns] = block.A
             b.append(block.b)
@@ -206,7 +195,13 @@ class WrenchSpace:
     @cached_property
     def _sum(self) -> BlockSum:
         """The sum of the blocks, without wrench rows."""
-        return BlockSum(self.origin, self.generators, self._blocks)
+        blocks = []
+        for columns, A, b in self._coupled:
+            vertices, facets = polytope(A, b)
+            if not len(vertices):
+                raise self._empty(columns)
+            blocks.append(Block(columns, vertices, A[facets], b[facets]))
+        return BlockSum(self.origin, self.generators, blocks)
 
     def _empty(self, columns: Indices | None = None) -> EmptySetError:
         names = "" if columns is None else " of " + ", ".join(self.columns[i] for i in columns)
@@ -226,7 +221,7 @@ class WrenchSpace:
         """Wrench rows beyond which the sum of the blocks reaches."""
         slopes = self.D @ self.generators
         reach = self.D @ self.origin
-        for columns, vertices, *_ in self._blocks:
+        for columns, vertices, *_ in self._sum.blocks:
             reach = reach + (slopes[:, columns] @ vertices.T).max(axis=1)
         cuts: Indices = np.flatnonzero(reach > self._held * (1.0 + SETTINGS.tolerance))
         # where the sum reaches least far along the cuts is most often a wrench of the set
@@ -394,7 +389,8 @@ class WrenchSpace:
         stretch = float(np.prod(self._sum.axes[1]))
         if r == 0:
             return 0.0, 0
+        vertices = self._vertices
         if r == 1:
-            return float(np.ptp(self._vertices)) * stretch, 1
+            return float(np.ptp(vertices)) * stretch, 1
         # joggled: merged facets may be so wide in a set of fine facets that volume is lost
-        return float(hull(self._vertices, "QJ").volume) * stretch, r
+        return float(hull(vertices, "QJ").volume) * stretch, r

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -115,16 +114,19 @@ class Cascade:
     ----------
     units : int
         T + H, the number of tiles and palms.
+    fingers : FingerStates
+        States of the fingers at the plan's tensions.
+    used : ndarray, shape (T + H,)
+        Utilisation of each tile's strength and each palm's in shear in the plan.
     """
 
     def __init__(
         self, prepared: PreparedStance, loads: Loads, slipped: Flags | None = None
     ) -> None:
         batch = prepared.batch
-        self._batch, self._loads = batch, loads
+        self._batch = batch
         places, T, H = batch.places, len(batch.engagement), len(batch.hands)
         self.units, F = T + H, len(places.phalanges)
-        self._gone = np.zeros(T + H, dtype=bool) if slipped is None else slipped
         # where a unit's bit is in a state: phalanges by finger, bases after, then palms
         self._phalanx = np.full(T, -1)
         self._phalanx[places.phalanges] = np.arange(3)
@@ -158,6 +160,19 @@ class Cascade:
         self._planes = _half_planes(prepared)
         self._rub_stiffness = BALANCE_SETTINGS.soft * batch.hands[0].hand.lateral_stiffness
         self._rubs = BALANCE_SETTINGS.rubs * max(1.0, float(np.linalg.norm(prepared.wrench[:3])))
+        self._load(loads, np.zeros(T + H, dtype=bool) if slipped is None else slipped)
+
+    def _load(self, loads: Loads, gone: Flags) -> None:
+        """Set what follows from a plan's loads, and from what has slipped before it."""
+        self._loads, self._gone = loads, gone
+        off = gone[: len(self._phalanx)]
+        self._on = (self._batch.touch.touches > 0.0) & ~off
+        self.fingers = FingerStates.of(self._batch, loads.tiles, off)
+        # of the hands on the rock, in B, moments over 0.1 m
+        of_tiles = np.einsum("tk,tki->i", loads.tiles, self._per_load)
+        self._wrench = of_tiles + loads.palms.ravel() @ self._per_palm
+        none = np.zeros((1, len(loads.palms)), bool)
+        self.used = self._used(loads.tiles[None], loads.palms[None], self._on[None], none)[0]
 
     def replanned(self, loads: Loads, slipped: Flags) -> Cascade:
         """Return the tables of another plan of the same stance, made after slips.
@@ -169,32 +184,8 @@ class Cascade:
             Tiles that drag or are off, and palms that have slipped, before the plan.
         """
         other = copy(self)
-        for name in ("fingers", "_wrench", "_on", "used"):
-            other.__dict__.pop(name, None)
-        other._loads, other._gone = loads, slipped
+        other._load(loads, slipped)
         return other
-
-    @cached_property
-    def fingers(self) -> FingerStates:
-        """States of the fingers at the plan's tensions."""
-        return FingerStates.of(self._batch, self._loads.tiles, self._gone[: len(self._phalanx)])
-
-    @cached_property
-    def used(self) -> Array:
-        """Utilisation of each tile's strength and each palm's in shear in the plan, (T + H,)."""
-        tiles, palms = self._loads.tiles, self._loads.palms[None]
-        gone = np.zeros(palms.shape[:2], bool)
-        return np.asarray(self._used(tiles[None], palms, self._on[None], gone)[0])
-
-    @cached_property
-    def _on(self) -> Flags:
-        return (self._batch.touch.touches > 0.0) & ~self._gone[: len(self._phalanx)]
-
-    @cached_property
-    def _wrench(self) -> Array:
-        """Wrench of the plan's hands on the rock, in B, moments over 0.1 m."""
-        tiles, laterals = self._loads.tiles, self._loads.palms.ravel() @ self._per_palm
-        return np.asarray(np.einsum("tk,tki->i", tiles, self._per_load) + laterals)
 
     def start(self, draws: int) -> NDArray[np.uint8]:
         """Return the states of draws in which nothing has slipped since the plan."""
