@@ -53,9 +53,8 @@ class SpinyHand(HandModel):
 
     Attributes
     ----------
-    settled, settled_scans : BoundedStore
-        Caches of settled hands: on holds given by numbers, and on meshes and profiles.
-        `settle_each` looks here first.
+    settled : BoundedStore
+        Cache of settled hands. `settle_each` looks here first.
     seated_best : BoundedStore
         Cache of hands in the best seats found by `hand_models.fixed_wrist.seat_search`.
     """
@@ -65,9 +64,8 @@ class SpinyHand(HandModel):
         most = 256  # hands: sixty-four stances of four; each takes 20 kB
         # of triangles: twenty scans of 200,000, or the largest mesh that a request may have
         most_bytes = 150_000_000
-        self.settled: BoundedStore[Hashable, SettledHand] = BoundedStore("settled hands", most)
-        self.settled_scans: BoundedStore[Hashable, SettledHand] = BoundedStore(
-            "settled hands on scans", most, _rock_bytes, most_bytes
+        self.settled: BoundedStore[Hashable, SettledHand] = BoundedStore(
+            "settled hands", most, _rock_bytes, most_bytes
         )
         self.seated_best: BoundedStore[Hashable, SettledHand] = BoundedStore(
             "best seats", most, _rock_bytes, most_bytes
@@ -135,31 +133,8 @@ class SpinyHand(HandModel):
             In the order of ``placements``; for a hand that cannot close, the error that `settle`
             would raise.
         """
-        scanned = [each.hold.scanned for each in placements]
-        if not any(scanned):
-            return self._known_or_settled(self.settled, placements)
-        smooth, rough = (
-            iter(
-                self._known_or_settled(
-                    self.settled_scans if of else self.settled,
-                    [each for each, scan in zip(placements, scanned, strict=True) if scan == of],
-                )
-            )
-            for of in (False, True)
-        )
-        return [next(rough if scan else smooth) for scan in scanned]
-
-    def keep(self, closed: Iterable[tuple[Placement, SettledHand]]) -> None:
-        """Add closed hands, each with its placement, to the caches that `settle_each` searches."""
-        for placement, settled in closed:
-            store = self.settled_scans if placement.hold.scanned else self.settled
-            store.keep([(PlacementKey(placement), settled)])
-
-    def _known_or_settled(
-        self, store: BoundedStore[Hashable, SettledHand], placements: Sequence[Placement]
-    ) -> list[SettledHand | InvalidInputError]:
         keys = [PlacementKey(each) for each in placements]
-        known: list[SettledHand | InvalidInputError | None] = [*store.find(keys)]
+        known: list[SettledHand | InvalidInputError | None] = [*self.settled.find(keys)]
         new: dict[PlacementKey, list[int]] = {}
         for i, key in enumerate(keys):
             if known[i] is None:
@@ -172,13 +147,18 @@ class SpinyHand(HandModel):
                     kept.append((key, outcome))
                 for i in alike:
                     known[i] = outcome
-            store.keep(kept)
+            self.settled.keep(kept)
         return [outcome for outcome in known if outcome is not None]
+
+    def keep(self, closed: Iterable[tuple[Placement, SettledHand]]) -> None:
+        """Add closed hands, each with its placement, to the cache that `settle_each` searches."""
+        self.settled.keep([(PlacementKey(placement), settled) for placement, settled in closed])
 
 
 def _rock_bytes(hands: Iterable[SettledHand]) -> int:
     """Return how many bytes the rock has that hands are on, of each hold once."""
-    return sum({hand.hold: hand.hold.nbytes for hand in hands}.values())
+    # those that have any are compared by identity
+    return sum({id(hand.hold): hand.hold.nbytes for hand in hands}.values())
 
 
 def nearby_closures(settled: SettledHand, distance: float = 1e-4) -> tuple[NearbyClosure, ...]:

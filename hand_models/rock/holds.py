@@ -28,9 +28,6 @@ class Hold(ABC):
 
     shape: str
 
-    scanned = False
-    """True if the hold consists of measured data, False if a few numbers describe its shape."""
-
     nbytes = 0
     """Memory that the hold's data takes [bytes]; 0 for a shape of a few numbers."""
 

@@ -249,8 +249,6 @@ class OutlinedHold(Hold):
         of its tiles is the scale to which the rock is smoothed for its fingers.
     """
 
-    scanned = True
-
     def __init__(self, hand: ParameterTable | None = None) -> None:
         load_compiled()
         self._scale = Scale.of(hand)

@@ -184,6 +184,12 @@ def _thread(n: int, of_tiles: float, of_palm: float) -> tuple[Array, Array, Indi
 
 
 @lru_cache(maxsize=4096)
+def _shared(
+    contact_stiffness: tuple[float, ...], spring: float, friction: float, own_friction: float
+) -> PalmSharing:
+    return share_load(contact_stiffness, spring, friction, own_friction)
+
+
 def shear_capacity(
     contact_stiffness: tuple[float, ...],
     spring_stiffness: float,
@@ -192,8 +198,6 @@ def shear_capacity(
     own_friction: float = 0.0,
 ) -> float:
     """Return the shear that a palm carries when its first tile reaches ``tile_limit`` [N].
-
-    The last 4096 results are kept in an LRU cache.
 
     Parameters
     ----------
@@ -208,11 +212,10 @@ def shear_capacity(
     own_friction : float, optional
         μ at the palm's pulleys between the tiles, in [0, 2).
     """
-    sharing = share_load(contact_stiffness, spring_stiffness, friction, own_friction)
+    sharing = _shared(contact_stiffness, spring_stiffness, friction, own_friction)
     return sharing.capacity(np.full(len(contact_stiffness), tile_limit))
 
 
-@lru_cache(maxsize=4096)
 def shear_stiffness(
     contact_stiffness: tuple[float, ...],
     spring_stiffness: float,
@@ -221,7 +224,7 @@ def shear_stiffness(
 ) -> float:
     """Return the load of a palm's tiles together over its travel from rest [N/m].
 
-    The last 4096 results are kept in an LRU cache. Parameters are those of `share_load`.
+    Parameters are those of `share_load`.
     """
-    sharing = share_load(contact_stiffness, spring_stiffness, friction, own_friction)
+    sharing = _shared(contact_stiffness, spring_stiffness, friction, own_friction)
     return float(sharing.tile_stiffness.sum())

@@ -44,7 +44,7 @@ def test_closing_is_broken_off_and_begun_again(wall: Mesh) -> None:
     with broken_off_by(check), pytest.raises(EnoughError):
         hand.settle(wall, ROCK, PINCH)
     assert calls == 20
-    assert hand.settled_scans.info().kept == 0
+    assert hand.settled.info().kept == 0
     go_on()
     whole = hand.settle(wall, ROCK, PINCH)
     again = SpinyHand(HAND.table).settle(wall, ROCK, PINCH)
