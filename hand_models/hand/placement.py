@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import BASE_TOLERANCES, Pose
+from hand_models.base import BASE_TOLERANCES, Array, Pose
 from hand_models.hand.finger_frames import STACK_ROWS
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
@@ -200,20 +199,20 @@ class PlacedHands:
         ]
         return SmoothCuts(shape, keys, sides, planes, alike)
 
-    @cached_property
-    def gaps(self) -> list[list[float]]:
-        """Distances from the two base tiles, then the palm's tiles, of each hand to the rock [m].
+    def gaps(self) -> Array:
+        """Return how far the tiles of each hand's bases, then of its palm, are from the rock [m].
 
-        One list for each hand; along z of the hand frame H, negative inside the rock, infinite
-        without rock.
+        A row a hand; along z of the hand frame H, negative inside the rock, infinite without rock.
         """
         tiles, into = STACK_ROWS.tiles, STACK_ROWS.into
-        return [
-            self._gaps_on(i)
-            if shape is None
-            else entry_distances(shape, seen[tiles], seen[into]).tolist()
-            for i, (shape, seen) in enumerate(zip(self._shapes, self._seen, strict=True))
-        ]
+        return np.array(
+            [
+                self._gaps_on(i)
+                if shape is None
+                else entry_distances(shape, seen[tiles], seen[into])
+                for i, (shape, seen) in enumerate(zip(self._shapes, self._seen, strict=True))
+            ]
+        )
 
     def _gaps_on(self, index: int) -> list[float]:
         """Return the gaps of one hand on rock that is not smooth."""

@@ -232,7 +232,7 @@ class SettledHand:
         """Posture of each finger, in the order of `FINGERS`."""
         return self.postures.fingers(self.hand.finger)
 
-    @property
+    @cached_property
     def closures(self) -> tuple[str, ...]:
         """Closure of each finger, in the order of `FINGERS`.
 
@@ -269,7 +269,7 @@ class SettledHand:
         sums = self._whole_tiles
         return np.asarray(self.engagement / np.where(sums > 0.0, sums, 1.0)[self.finger_of])
 
-    @property
+    @cached_property
     def limit_shares(self) -> Array:
         """Share of a whole tile's strength that limits each tile's load, shape (n,).
 
@@ -307,7 +307,7 @@ class SettledHand:
         """
         return 1.0 if self.surface.name == FITTED_SURFACE else self.hand.rock_stiffness_ratio
 
-    @property
+    @cached_property
     def palm_shear_stiffness(self) -> float:
         """Stiffness of the palm's shear toward −x [N/m].
 

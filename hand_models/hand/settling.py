@@ -96,19 +96,21 @@ def _close(
     """Return hands closed where they are placed, and the lifts of those with rock in fingers."""
     hand, placements = placed.hand, placed.placements
     errors: dict[int, InvalidInputError] = {}
-    for i, (tension, gaps) in enumerate(zip(tensions, placed.gaps, strict=True)):
+    of_bases, of_palms = np.hsplit(placed.gaps(), [STACK_ROWS.base_count])
+    nearest = of_palms.min(axis=1).tolist()
+    for i, (tension, gap) in enumerate(zip(tensions, nearest, strict=True)):
         if tension > hand.maximum_tension:
             errors[i] = InvalidInputError(
                 f"must be at most tendon.maximum_tension, {hand.maximum_tension:g} N, got "
                 f"{tension:g} N",
                 field="grasp.closing_tension",
             )
-        elif min(gaps[STACK_ROWS.base_count :]) < -hand.spine_travel:
-            errors[i] = _in_palm(hand, min(gaps[STACK_ROWS.base_count :]))
+        elif gap < -hand.spine_travel:
+            errors[i] = _in_palm(hand, gap)
     closed = close_fingers(placed, laid, tensions, errors)
     for i, error in _too_slack(placed, laid, closed, tensions):
         errors.setdefault(i, error)
-    tiles = tiles_on_rock(placed, closed, tensions)
+    tiles = tiles_on_rock(placed, of_bases, closed, tensions)
     nails: dict[int, Nails] = {}
     for i, tension in enumerate(tensions):
         if i not in errors:
@@ -116,7 +118,7 @@ def _close(
                 nails[i] = hook_nails(placed, closed, i, tension)
             except InvalidInputError as error:
                 errors[i] = error
-    palms = palms_on_rock(placed)
+    palms = palms_on_rock(placed, of_palms)
     outcomes: list[SettledHand | InvalidInputError] = []
     for i, (each, of_tiles, *posture) in enumerate(
         zip(placements, hand_tiles(tiles, nails), *closed.postures, strict=True)

@@ -14,7 +14,7 @@ import numpy as np
 from hand_models.base import Array, Indices
 from hand_models.finger import CONTACT_KINDS, PHALANGES
 from hand_models.hand.closed_fingers import ClosedFingers
-from hand_models.hand.finger_frames import OUTER_FINGERS, STACK_ROWS, TILE_COLUMNS
+from hand_models.hand.finger_frames import OUTER_FINGERS, TILE_COLUMNS
 from hand_models.hand.hooked_nails import Nails
 from hand_models.hand.names import CONTACT_NAMES, FINGERS, NAIL
 from hand_models.hand.placement import PlacedHands
@@ -73,12 +73,16 @@ class HandTiles(NamedTuple):
     engagement: Array
 
 
-def tiles_on_rock(placed: PlacedHands, closed: ClosedFingers, tensions: Sequence[float]) -> Array:
+def tiles_on_rock(
+    placed: PlacedHands, depths: Array, closed: ClosedFingers, tensions: Sequence[float]
+) -> Array:
     """Return places, axes and loads of all finger tiles of n closed hands, as one array.
 
     Parameters
     ----------
     placed : PlacedHands
+    depths : ndarray, shape (n, 2)
+        Gaps of the base tiles, as in `PlacedHands.gaps` [m].
     closed : ClosedFingers
     tensions : sequence of float, length n
         Closing tensions [N].
@@ -94,14 +98,13 @@ def tiles_on_rock(placed: PlacedHands, closed: ClosedFingers, tensions: Sequence
     places = (closed.places @ frames.planes).reshape((*frames.across.shape[:3], 9))
     places[..., :3] += closed.postures.across[..., None] * frames.across
     bodies = np.concatenate([places, frames.across, closed.tiles], axis=3)
-    bases = _base_tiles(placed, tensions)
+    bases = _base_tiles(placed, depths, tensions)
     return np.concatenate([bases, bodies.reshape(count, -1, TILE_COLUMNS.total)], axis=1)
 
 
-def _base_tiles(placed: PlacedHands, tensions: Sequence[float]) -> Array:
+def _base_tiles(placed: PlacedHands, depths: Array, tensions: Sequence[float]) -> Array:
     """Return the base tiles, which carry shear where rock is within the spines' travel."""
     model, tiles = placed.hand.finger, placed.frames.base_tiles
-    depths = np.array(placed.gaps)[:, : STACK_ROWS.base_count]
     shares = engaged_share(
         np.abs(depths), placed.hand.spine_travel, placed.hand.engagement_exponent
     )
@@ -170,13 +173,13 @@ def _named(kinds: bytes, nails: bool) -> tuple[SettledTile, ...]:
     )
 
 
-def palms_on_rock(placed: PlacedHands) -> list[SettledPalm]:
+def palms_on_rock(placed: PlacedHands, gaps: Array) -> list[SettledPalm]:
     """Return the palm of each hand: its engaged tiles and their strength.
 
     A tile is engaged if rock is within its spines' travel. A grasp without ``palm`` engages none.
+    ``gaps``, shape (n, 8): those of the palms' tiles, as in `PlacedHands.gaps` [m].
     """
     hand = placed.hand
-    gaps = np.array(placed.gaps)[:, STACK_ROWS.base_count :]
     shares = engaged_share(gaps, hand.spine_travel, hand.engagement_exponent)
     gaps.setflags(write=False)
     places = np.zeros((len(gaps), 3))
