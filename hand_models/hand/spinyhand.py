@@ -157,8 +157,7 @@ class SpinyHand(HandModel):
 
 def _rock_bytes(hands: Iterable[SettledHand]) -> int:
     """Return how many bytes the rock has that hands are on, of each hold once."""
-    # those that have any are compared by identity
-    return sum({id(hand.hold): hand.hold.nbytes for hand in hands}.values())
+    return sum({hand.hold: hand.hold.nbytes for hand in hands if hand.hold.nbytes}.values())
 
 
 def nearby_closures(settled: SettledHand, distance: float = 1e-4) -> tuple[NearbyClosure, ...]:
