@@ -11,8 +11,8 @@ from hand_models.compliance import (
     FloatingWrist,
     Gripper,
     farthest,
-    search,
     search_box,
+    search_grid,
     wrist_pose,
 )
 from hand_models.fixed_wrist import wrench_space
@@ -57,7 +57,7 @@ def test_search_of_the_plane(benchmark):
     gripper = Gripper(0.3, 37.0)
 
     def hull():
-        found = search(gripper, 60)
+        found = search_grid(gripper, 60)
         return found, found.hull
 
     found, hull = benchmark(hull)
@@ -78,5 +78,5 @@ def test_floor_of_that_search(benchmark):
 def test_search_of_a_whole_hand(benchmark, per_axis):
     """11^6 poses take (11/7)^6 = 15 times as long as 7^6."""
     wrist = FloatingWrist(CompliantHand(settled()))
-    found = benchmark.pedantic(search, (wrist, per_axis), rounds=1)
+    found = benchmark.pedantic(search_grid, (wrist, per_axis), rounds=1)
     assert found.tried == per_axis**6

@@ -21,7 +21,7 @@ from .grid_search import (
     PLANAR_COMPONENTS as PLANAR_COMPONENTS,
     WristSearch as WristSearch,
     boundary as boundary,
-    search as search,
+    search_grid as search_grid,
 )
 from .gripper import (
     GRIPPER_SIDES as GRIPPER_SIDES,

@@ -21,7 +21,7 @@ from hand_models.compliance.grasp import CompliantGrasp
 from hand_models.compliance.pose_box import SearchBox, search_box
 from hand_models.wrench_spaces import WRENCH_SCALE, Row
 
-__all__ = ["PLANAR_COMPONENTS", "WristSearch", "boundary", "search"]
+__all__ = ["PLANAR_COMPONENTS", "WristSearch", "boundary", "search_grid"]
 
 PLANAR_COMPONENTS: Final = (0, 2, 4)
 """Indices of F_x, F_z and M_y in a wrench: the components of a grasp that moves in a plane."""
@@ -76,7 +76,9 @@ class WristSearch:
         return float((self.wrenches @ np.asarray(direction, dtype=float)).max())
 
 
-def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = None) -> WristSearch:
+def search_grid(
+    grasp: CompliantGrasp, per_axis: int, progress: Progress | None = None
+) -> WristSearch:
     """Return the wrench space of a grasp by grid search over poses of its wrist.
 
     Parameters

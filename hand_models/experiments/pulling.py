@@ -20,7 +20,7 @@ from hand_models.compliance import (
     Gripper,
     Numbers,
     WristSearch,
-    search,
+    search_grid,
 )
 from hand_models.experiments.study_result import part
 from hand_models.experiments.wrench_hull import (
@@ -111,7 +111,7 @@ def explored(gripper: Gripper, count: int, progress: Progress) -> tuple[WristSea
         If the closed gripper exceeds a limit without load.
     """
     unloaded(gripper)
-    found = search(gripper, PULLING_SETTINGS.poses_per_axis, part(progress, 0, 1, 10))
+    found = search_grid(gripper, PULLING_SETTINGS.poses_per_axis, part(progress, 0, 1, 10))
     wrenches = in_paper_signs(found.wrenches)
     size = np.abs(clipped_vertices(wrenches)).max(axis=0)
     pulled = pull(gripper, even_pulls(count, size), part(progress, 1, 10, 10))
@@ -127,7 +127,7 @@ def held_wrenches(gripper: Gripper) -> Array:
     ndarray, shape (n, 3)
         Wrenches (F_x, F_z, M_y) and their mirror images, in the paper's signs [N, N, N·m].
     """
-    found = search(gripper, PULLING_SETTINGS.poses_per_axis)
+    found = search_grid(gripper, PULLING_SETTINGS.poses_per_axis)
     return with_mirrored(in_paper_signs(found.wrenches))
 
 

@@ -16,7 +16,7 @@ from .section import (
     Vector2 as Vector2,
 )
 from .settings import SECTION_SETTINGS as SECTION_SETTINGS
-from .smooth import Disc as Disc, SmoothSection as SmoothSection, Wall as Wall
+from .smooth import Disc as Disc, FlatRock as FlatRock, SmoothSection as SmoothSection
 from .swept_cuts import (
     FingerPlane as FingerPlane,
     Swept as Swept,

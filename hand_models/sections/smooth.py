@@ -23,7 +23,7 @@ import numpy as np
 
 from hand_models.sections.section import Complexes, Face, Rest, Section, Turned
 
-__all__ = ["Disc", "SmoothSection", "Wall", "into_circle", "past_circle", "to_face"]
+__all__ = ["Disc", "FlatRock", "SmoothSection", "into_circle", "past_circle", "to_face"]
 
 Tangent = tuple[complex, float]
 """Direction of a phalanx whose face's line touches the rock, and the contact's distance along the
@@ -198,7 +198,7 @@ class Disc(SmoothSection):
         return [centre + radius * toward * np.exp(1j * turns)]
 
 
-class Wall(SmoothSection):
+class FlatRock(SmoothSection):
     """A half-plane of rock.
 
     Parameters

@@ -25,7 +25,7 @@ from hand_models.base import BASE_TOLERANCES, Array
 from hand_models.sections.ellipses import Ellipse, arc, radii, rock_left
 from hand_models.sections.section import Complexes, Face
 from hand_models.sections.settings import SECTION_SETTINGS
-from hand_models.sections.smooth import Disc, SmoothSection, Tangent, Wall
+from hand_models.sections.smooth import Disc, FlatRock, SmoothSection, Tangent
 
 __all__ = ["FingerPlane", "Swept", "cut_of", "entry_distances"]
 
@@ -119,7 +119,7 @@ def cut_of(shape: Swept, plane: FingerPlane) -> SmoothSection | None:
         steep = math.hypot(c, f)
         if steep < SECTION_SETTINGS.parallel_sine:
             return None
-        return Wall(complex(c, f) / steep, -z / steep)
+        return FlatRock(complex(c, f) / steep, -z / steep)
     if shape.scale_y:
         # Cholesky's factor of the ellipsoid's quadratic form in the plane
         g11, g12, g22 = a * a + b * b + c * c, a * d + b * e + c * f, d * d + e * e + f * f
@@ -156,7 +156,7 @@ def cut_of(shape: Swept, plane: FingerPlane) -> SmoothSection | None:
     return _Edge(core, radii((A, B), rho), math.atan2(shape.cosine, shape.sine), *lines)
 
 
-def _along_axis(shape: Swept, plane: FingerPlane) -> Wall | None:
+def _along_axis(shape: Swept, plane: FingerPlane) -> FlatRock | None:
     """Return the straight rock in a plane that holds the axis of an extrusion."""
     depth = float(entry_distances(shape, plane[6:], plane[3:6]))
     if not math.isfinite(depth):
@@ -165,7 +165,7 @@ def _along_axis(shape: Swept, plane: FingerPlane) -> Wall | None:
     a, _, c, d, _, f = plane[:6]
     lost = complex(d * d + f * f - a * a - c * c, -2.0 * (a * d + c * f))
     along = (lost / abs(lost)) ** 0.5
-    wall = Wall(1j * along, along.real * depth)
+    wall = FlatRock(1j * along, along.real * depth)
     wall.skew = True
     return wall
 

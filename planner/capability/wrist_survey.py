@@ -15,7 +15,7 @@ from hand_models.compliance import (
     FloatingWrist,
     WristSearch,
     farthest,
-    search,
+    search_grid,
 )
 
 __all__ = ["Survey", "survey"]
@@ -72,7 +72,7 @@ def survey(
         if progress is not None:
             progress(done, total)
 
-    found = search(wrist, per_axis, lambda done, _: report(done))
+    found = search_grid(wrist, per_axis, lambda done, _: report(done))
     ends = []
     for i, direction in enumerate(directions):
         report(poses + i * each)

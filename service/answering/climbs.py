@@ -226,7 +226,7 @@ def answer_climb(
     return climb_reply(request, seek_climb(request, robots, parts), parts)
 
 
-def _rock(message: requests.Mesh | str, numbers: ParameterTable) -> tuple[rock.Mesh, Pose]:
+def _rock(message: requests.MeshMessage | str, numbers: ParameterTable) -> tuple[rock.Mesh, Pose]:
     """Return the rock of a request, and its frame in W."""
     if isinstance(message, str):
         name, _, seed = message.partition(":")

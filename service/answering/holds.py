@@ -38,23 +38,23 @@ def hold_of(message: requests.Rock, numbers: ParameterTable, anywhere: bool) -> 
         If the rock is impossible; ``field`` is relative to the hold.
     """
     match message:
-        case requests.Plane():
+        case requests.PlaneMessage():
             return rock.Plane()
-        case requests.Cylinder():
+        case requests.CylinderMessage():
             return rock.Cylinder(message.diameter)
-        case requests.Sphere():
+        case requests.SphereMessage():
             return rock.Sphere(message.diameter)
-        case requests.Ellipsoid():
+        case requests.EllipsoidMessage():
             return rock.Ellipsoid(message.semi_axes)
-        case requests.Edge():
+        case requests.EdgeMessage():
             return rock.Edge(message.fillet_radius, message.angle)
-        case requests.Profile():
+        case requests.ProfileMessage():
             return _profile(message, numbers)
-        case requests.Mesh():
+        case requests.MeshMessage():
             return _mesh(message, numbers, anywhere)
 
 
-def _profile(message: requests.Profile, numbers: ParameterTable) -> Profile:
+def _profile(message: requests.ProfileMessage, numbers: ParameterTable) -> Profile:
     if message.points is not None and message.profiles is None:
         return Profile(message.points, numbers)
     if message.profiles is not None and message.points is None:
@@ -70,7 +70,7 @@ def _profile(message: requests.Profile, numbers: ParameterTable) -> Profile:
     raise InvalidInputError(f"give points or profiles, got {got}", field="points")
 
 
-def _mesh(message: requests.Mesh, numbers: ParameterTable, anywhere: bool) -> Mesh:
+def _mesh(message: requests.MeshMessage, numbers: ParameterTable, anywhere: bool) -> Mesh:
     if message.file is not None:
         raise InvalidInputError(
             "only the command line reads files; send vertices and faces", field="file"
@@ -83,7 +83,7 @@ def _mesh(message: requests.Mesh, numbers: ParameterTable, anywhere: bool) -> Me
     return MESHES_OF_REQUESTS.get(key, lambda: Mesh(vertices, faces, numbers, anywhere=anywhere))
 
 
-def surface_of(message: str | requests.Surface) -> Surface:
+def surface_of(message: str | requests.SurfaceMessage) -> Surface:
     """Return the surface of a preset's name or of a caller's own numbers.
 
     Raises
@@ -111,12 +111,12 @@ def surface_of(message: str | requests.Surface) -> Surface:
         raise error.within("surface") from None
 
 
-def check_costs(stance: requests.Stance) -> None:
+def check_costs(stance: requests.StanceMessage) -> None:
     """Refuse a stance whose hands have too many half-planes or outline points in all.
 
     Parameters
     ----------
-    stance : requests.Stance
+    stance : requests.StanceMessage
         Stance of the request.
 
     Raises
@@ -150,7 +150,7 @@ def check_costs(stance: requests.Stance) -> None:
 
 
 def _half_planes(hand: requests.Hand) -> int:
-    given = hand.surface.half_planes if isinstance(hand.surface, requests.Surface) else None
+    given = hand.surface.half_planes if isinstance(hand.surface, requests.SurfaceMessage) else None
     return given or 1
 
 
@@ -158,7 +158,7 @@ def _points(hold: requests.Hold, rocks: dict[str, requests.Rock]) -> int:
     """Return how many points the outlines of a hold have, those of a shared rock as its own."""
     if isinstance(hold, requests.RockReference):
         return _points(rocks[hold.rock], {}) if hold.rock in rocks else 0
-    if not isinstance(hold, requests.Profile):
+    if not isinstance(hold, requests.ProfileMessage):
         return 0
     strips = () if hold.profiles is None else msgspec.structs.astuple(hold.profiles)
     return sum(map(len, strips)) + len(hold.points or ())

@@ -12,7 +12,15 @@ import msgspec
 
 from hand_models.base import BoundedStore, InvalidInputError, errors_under
 from hand_models.rock import read_mesh
-from service.requests import ClimbRequest, Hand, Hold, Mesh, PlanRequest, Request, RouteRequest
+from service.requests import (
+    ClimbRequest,
+    Hand,
+    Hold,
+    MeshMessage,
+    PlanRequest,
+    Request,
+    RouteRequest,
+)
 
 __all__ = ["MeshFiles"]
 
@@ -32,7 +40,7 @@ class MeshFiles:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._read: BoundedStore[Hashable, Mesh] = BoundedStore("mesh files", 8)
+        self._read: BoundedStore[Hashable, MeshMessage] = BoundedStore("mesh files", 8)
 
     def whole(self, request: RequestT) -> RequestT:
         """Replace the mesh files that a request names by their vertices and faces.
@@ -54,7 +62,7 @@ class MeshFiles:
             ``field`` is a path in the request.
         """
         replace = msgspec.structs.replace
-        if isinstance(request, ClimbRequest) and isinstance(request.rock, Mesh):
+        if isinstance(request, ClimbRequest) and isinstance(request.rock, MeshMessage):
             request = replace(request, rock=self._filled(request.rock, "rock"))
         if isinstance(request, (PlanRequest, RouteRequest)):
             stance = request.stance
@@ -88,7 +96,11 @@ class MeshFiles:
         replace = msgspec.structs.replace
 
         def renamed(hold: HoldT, before: Hold) -> HoldT:
-            if not isinstance(hold, Mesh) or not isinstance(before, Mesh) or before.file is None:
+            if (
+                not isinstance(hold, MeshMessage)
+                or not isinstance(before, MeshMessage)
+                or before.file is None
+            ):
                 return hold
             file = before.file
             if not Path(file).is_absolute():
@@ -110,7 +122,7 @@ class MeshFiles:
         ]
 
     def _filled(self, hold: HoldT, path: str) -> HoldT:
-        if not isinstance(hold, Mesh) or hold.file is None:
+        if not isinstance(hold, MeshMessage) or hold.file is None:
             return hold
         with errors_under(path):
             if hold.vertices is not None or hold.faces is not None:
@@ -120,16 +132,16 @@ class MeshFiles:
             known = self._mesh(self._folder / hold.file)
         return msgspec.structs.replace(hold, vertices=known.vertices, faces=known.faces, file=None)
 
-    def _mesh(self, path: Path) -> Mesh:
+    def _mesh(self, path: Path) -> MeshMessage:
         changed = None
         with suppress(OSError):  # reading reports a missing file
             changed = path.stat().st_mtime_ns
 
-        def read() -> Mesh:
+        def read() -> MeshMessage:
             vertices, faces = read_mesh(path)
             # tuples, which the garbage collector does not look at, take a fifth of the lists' time
             columns = (array.T.tolist() for array in (vertices, faces))
             points, corners = (list(zip(*each, strict=True)) for each in columns)
-            return Mesh(vertices=points, faces=corners)
+            return MeshMessage(vertices=points, faces=corners)
 
         return self._read.get((path, changed), read)

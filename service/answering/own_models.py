@@ -28,7 +28,7 @@ from service.requests import (
     Draw,
     PlanRequest,
     RouteRequest,
-    Stance,
+    StanceMessage,
     StreamRequest,
     WrenchSpaceRequest,
 )
@@ -179,7 +179,7 @@ def _asking_for(request: RequestT, low: Mapping[str, Any], high: Mapping[str, An
     return _replaced(request, hand=hand)
 
 
-def _robot_part(request: RequestT) -> Stance | ClimbRequest:
+def _robot_part(request: RequestT) -> StanceMessage | ClimbRequest:
     """Return the part of a request that names robot and hand: its stance, or all of a climb's."""
     return request if isinstance(request, ClimbRequest) else request.stance
 

@@ -148,7 +148,7 @@ def route_request(asked: requests.ClimbRequest, route: Route) -> requests.RouteR
         Its hands name the rock ``rock``, which has to be put into ``stance.rocks``.
     """
     start, joints = route.start, route.start.joints
-    stance = requests.Stance(
+    stance = requests.StanceMessage(
         robot=asked.robot,
         hand=asked.hand,
         gravity=_vector(start.gravity),
@@ -163,7 +163,7 @@ def route_request(asked: requests.ClimbRequest, route: Route) -> requests.RouteR
         objective=route.objective,
         limits=route.limits,
         moves=[
-            requests.Move(
+            requests.MoveMessage(
                 **_hand_fields(asked, move.hand),
                 body=None if move.body is None else pose_of_request(move.body),
                 joints="solve" if isinstance(move.joints, str) else _lists(move.joints),
@@ -184,10 +184,10 @@ def _hand_fields(asked: requests.ClimbRequest, hand: HandOnHold) -> dict[str, An
     return own | {"surface": surface, "grasp": grasp}
 
 
-def pose_of_request(pose: Pose) -> requests.Pose:
+def pose_of_request(pose: Pose) -> requests.PoseMessage:
     """Return a pose as a message."""
     x, y, z, w = pose.quaternion().tolist()
-    return requests.Pose(position=_vector(pose.position), orientation=(x, y, z, w))
+    return requests.PoseMessage(position=_vector(pose.position), orientation=(x, y, z, w))
 
 
 def _vector(values: Array) -> tuple[float, float, float]:

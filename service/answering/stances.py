@@ -32,12 +32,12 @@ Rocks = Mapping[str, tuple[rock.Hold, Pose | None]]
 """Rocks of a stance by name: each rock's shape, and its pose in W, or None where none is given."""
 
 
-def stance(message: requests.Stance, robots: Robots = BUNDLED_ROBOTS) -> Stance:
+def stance(message: requests.StanceMessage, robots: Robots = BUNDLED_ROBOTS) -> Stance:
     """Convert the stance of a request into the planner's stance.
 
     Parameters
     ----------
-    message : requests.Stance
+    message : requests.StanceMessage
         Body pose, hands on holds, and optionally robot, hand parameters, rocks and joints.
     robots : Robots, optional
         Robots that a stance may name, with their builders; bundled robots by default.
@@ -55,7 +55,9 @@ def stance(message: requests.Stance, robots: Robots = BUNDLED_ROBOTS) -> Stance:
     return with_rocks(message, robots)[0]
 
 
-def with_rocks(message: requests.Stance, robots: Robots = BUNDLED_ROBOTS) -> tuple[Stance, Rocks]:
+def with_rocks(
+    message: requests.StanceMessage, robots: Robots = BUNDLED_ROBOTS
+) -> tuple[Stance, Rocks]:
     """Convert the stance of a request, and return it with its rocks; parameters as for `stance`.
 
     Returns
@@ -117,7 +119,7 @@ def hands_on_rocks(
         If a hand is impossible, or its rock is unknown; ``field`` begins with the path.
     """
     paths = [f"{path}[{i}]" for i in range(len(messages))]
-    given: dict[str, requests.Pose | None] = {}
+    given: dict[str, requests.PoseMessage | None] = {}
     for at, each in zip(paths, messages, strict=True):
         given |= {f"{at}.hold.pose": each.hold.pose, f"{at}.pose": each.pose}
         given[f"{at}.hold.pose_in_hand"] = each.hold.pose_in_hand
@@ -228,7 +230,7 @@ def _placed_hold(
     return shared, own
 
 
-def poses_of(messages: Mapping[str, requests.Pose | None]) -> dict[str, Pose]:
+def poses_of(messages: Mapping[str, requests.PoseMessage | None]) -> dict[str, Pose]:
     """Return the poses that are given, by their paths in the request; leave out missing ones.
 
     Raises
@@ -293,7 +295,7 @@ def _frame(place: requests.Place, rock_pose: Pose) -> Pose:
 # Holds --------------------------------------------------------------------------------------------
 
 
-def _rocks(message: requests.Stance, numbers: ParameterTable) -> Rocks:
+def _rocks(message: requests.StanceMessage, numbers: ParameterTable) -> Rocks:
     """Return the rocks of a stance by name, each built once."""
     found = {}
     for name, each in message.rocks.items():

@@ -11,7 +11,7 @@ from .columns import (
     route_columns as route_columns,
     row_of as row_of,
 )
-from .evaluation import Question as Question, answered as answered, evaluate as evaluate
+from .evaluation import Question as Question, answer_all as answer_all, answered as answered
 from .exports import (
     exporter_at as exporter_at,
     write_csv as write_csv,

@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
     from planner import RobotFile
 
-__all__ = ["Question", "answered", "evaluate"]
+__all__ = ["Question", "answer_all", "answered"]
 
 Question = bytes | PlanRequest | RouteRequest | ClimbRequest | Answer
 
 
-def evaluate(
+def answer_all(
     questions: Iterable[Question],
     on: str | Client = "processes",
     *,

@@ -107,7 +107,7 @@ def write_search(
     write_rock(sought.rock.triangles, files["rock"])
     given = answering.route_request(request, found.route)
     pose = answering.pose_of_request(sought.rock_pose)
-    rocks = {"rock": requests.Mesh(file=files["rock"].name, pose=pose)}
+    rocks = {"rock": requests.MeshMessage(file=files["rock"].name, pose=pose)}
     stance = msgspec.structs.replace(given.stance, rocks=rocks)
     write_stance(msgspec.structs.replace(given, stance=stance), files["route"])
     return files

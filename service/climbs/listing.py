@@ -23,7 +23,7 @@ class Listing(NamedTuple):
     Attributes
     ----------
     kind : str
-        Of `service.bulk.evaluate`.
+        Of `service.bulk.answer_all`.
     noun : str
         Plural name of what is listed.
     work : str

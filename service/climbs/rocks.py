@@ -11,7 +11,7 @@ from service import requests
 __all__ = ["rock_message"]
 
 
-def rock_message(rock: Path, lean: float) -> requests.Mesh | str:
+def rock_message(rock: Path, lean: float) -> requests.MeshMessage | str:
     """Return the rock of a request.
 
     Parameters
@@ -40,7 +40,7 @@ def rock_message(rock: Path, lean: float) -> requests.Mesh | str:
         return str(rock)
     vertices, faces, _ = read_rock(rock)
     sine, cosine = math.sin(lean), math.cos(lean)
-    pose = requests.Pose(
+    pose = requests.PoseMessage(
         position=(0.0, 0.0, 0.0), x_axis=(sine, 0.0, cosine), z_axis=(cosine, 0.0, -sine)
     )
-    return requests.Mesh(vertices=vertices.tolist(), faces=faces.tolist(), pose=pose)
+    return requests.MeshMessage(vertices=vertices.tolist(), faces=faces.tolist(), pose=pose)

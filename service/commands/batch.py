@@ -111,7 +111,7 @@ def batch_command(
         before = sink.tally.count
         on, workers = parallel.place(lines.count - before)
         answers = partial(
-            bulk.evaluate,
+            bulk.answer_all,
             on=on,
             workers=workers,
             hand=own.hand,

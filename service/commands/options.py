@@ -174,7 +174,7 @@ class WorkersOption(NamedTuple):
         Returns
         -------
         on : str
-            ``here``, ``processes``, or a Dask cluster, for `service.bulk.evaluate`.
+            ``here``, ``processes``, or a Dask cluster, for `service.bulk.answer_all`.
         workers : int or None
             Number of worker processes; None for the default.
         """

@@ -181,7 +181,7 @@ def _print(
 
 def _needs_closing(request: requests.PlanRequest) -> bool:
     """Return True if hands are on rock that compiled code cuts and closes fingers on."""
-    rock = requests.Profile, requests.Mesh, requests.RockReference
+    rock = requests.ProfileMessage, requests.MeshMessage, requests.RockReference
     return any(isinstance(hand.hold, rock) for hand in request.stance.hands)
 
 

@@ -369,7 +369,7 @@ def _many(
     left = max(1, sources.count - before)
     on, workers = parallel.place(listing.plans * left)
     answer = partial(
-        bulk.evaluate,
+        bulk.answer_all,
         on=on,
         workers=None if workers is None else min(workers, left),
         robot=own.robot,

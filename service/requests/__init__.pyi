@@ -5,24 +5,24 @@ from .climb import (
     EndHand as EndHand,
 )
 from .holds import (
-    Cylinder as Cylinder,
-    Edge as Edge,
-    Ellipsoid as Ellipsoid,
+    CylinderMessage as CylinderMessage,
+    EdgeMessage as EdgeMessage,
+    EllipsoidMessage as EllipsoidMessage,
     Hold as Hold,
-    Mesh as Mesh,
-    Plane as Plane,
-    Profile as Profile,
+    MeshMessage as MeshMessage,
+    PlaneMessage as PlaneMessage,
+    ProfileMessage as ProfileMessage,
     Rock as Rock,
     RockReference as RockReference,
-    Sphere as Sphere,
-    Surface as Surface,
+    SphereMessage as SphereMessage,
+    SurfaceMessage as SurfaceMessage,
 )
 from .questions import (
     Axis as Axis,
     BodySpaceRequest as BodySpaceRequest,
     DiagnosisRequest as DiagnosisRequest,
     Draw as Draw,
-    Move as Move,
+    MoveMessage as MoveMessage,
     PlanRequest as PlanRequest,
     PlanWant as PlanWant,
     RouteRequest as RouteRequest,
@@ -37,13 +37,13 @@ from .request import (
     Identifier as Identifier,
     InParts as InParts,
     Later as Later,
-    Pose as Pose,
+    PoseMessage as PoseMessage,
     Query as Query,
     ReplyBytes as ReplyBytes,
     Request as Request,
     Wrench as Wrench,
 )
-from .stance import Hand as Hand, Place as Place, Stance as Stance
+from .stance import Hand as Hand, Place as Place, StanceMessage as StanceMessage
 from .streams import (
     LostTiles as LostTiles,
     SetPointsRequest as SetPointsRequest,

@@ -9,13 +9,13 @@ from msgspec import Meta, field
 from hand_models.base import Coordinate, InvalidFieldError, Name, Position, Strict
 from hand_models.hand import Grasp
 from planner import BodyGrid, Limits, PlaceGrid
-from service.requests.holds import Mesh, Surface
+from service.requests.holds import MeshMessage, SurfaceMessage
 from service.requests.questions import ObjectiveName
 from service.requests.request import (
     LONGEST_DEADLINE,
     Identifier,
     InParts,
-    Pose,
+    PoseMessage,
     Query,
     Request,
 )
@@ -37,7 +37,7 @@ class EndHand(Strict, frozen=True, kw_only=True):
     """
 
     limb: Name
-    pose: Annotated[Pose, Meta(description="of H in W")]
+    pose: Annotated[PoseMessage, Meta(description="of H in W")]
     grasp: Grasp = Grasp()
 
 
@@ -54,7 +54,7 @@ class ClimbEnd(Strict, frozen=True, kw_only=True):
     near: Annotated[Position | None, Meta(description="in W [m]")] = None
     radius: Annotated[float, Meta(gt=0.0, le=100.0, description="about near [m]")] = 0.3
     height: Annotated[Coordinate | None, Meta(description="z of the body's origin in W [m]")] = None
-    body: Annotated[Pose | None, Meta(description="of B in W")] = None
+    body: Annotated[PoseMessage | None, Meta(description="of B in W")] = None
     hands: Annotated[list[EndHand], Meta(max_length=16, description="one of every limb")] = []
 
     def __post_init__(self) -> None:
@@ -110,10 +110,12 @@ class ClimbRequest(Query, frozen=True, kw_only=True):
     robot: Name | None = None
     hand: HandEntries | None = None
     rock: Annotated[
-        Mesh | WallName,
+        MeshMessage | WallName,
         Meta(description="mesh, with its frame's pose in W; or name of a generated wall"),
     ]
-    surface: Annotated[Name | Surface, Meta(description="a preset's name, or numbers")] = "rock"
+    surface: Annotated[Name | SurfaceMessage, Meta(description="a preset's name, or numbers")] = (
+        "rock"
+    )
     start: ClimbEnd
     goal: ClimbEnd
     places: Annotated[PlaceGrid, Meta(description="where hands are tried")] = field(

@@ -8,20 +8,20 @@ from typing import Annotated
 from msgspec import Meta
 
 from hand_models.base import Coordinate, Name, Strict
-from service.requests.request import Pose
+from service.requests.request import PoseMessage
 
 __all__ = [
-    "Cylinder",
-    "Edge",
-    "Ellipsoid",
+    "CylinderMessage",
+    "EdgeMessage",
+    "EllipsoidMessage",
     "Hold",
-    "Mesh",
-    "Plane",
-    "Profile",
+    "MeshMessage",
+    "PlaneMessage",
+    "ProfileMessage",
     "Rock",
     "RockReference",
-    "Sphere",
-    "Surface",
+    "SphereMessage",
+    "SurfaceMessage",
 ]
 
 Diameter = Annotated[float, Meta(ge=1e-3, le=100.0, description="[m]")]
@@ -75,15 +75,15 @@ class Placed(Strict, frozen=True, kw_only=True, tag_field="shape"):
     - ``pose_in_hand``: pose of the hold's frame in H.
     """
 
-    pose: Annotated[Pose | None, Meta(description="in W")] = None
-    pose_in_hand: Annotated[Pose | None, Meta(description="in H")] = None
+    pose: Annotated[PoseMessage | None, Meta(description="in W")] = None
+    pose_in_hand: Annotated[PoseMessage | None, Meta(description="in H")] = None
 
 
-class Plane(Placed, frozen=True, kw_only=True, tag="plane"):
+class PlaneMessage(Placed, frozen=True, kw_only=True, tag="plane"):
     """Flat wall; z of its frame points into the rock."""
 
 
-class Cylinder(Placed, frozen=True, kw_only=True, tag="cylinder"):
+class CylinderMessage(Placed, frozen=True, kw_only=True, tag="cylinder"):
     """Round log of rock along y of its frame.
 
     - ``diameter``: diameter of the log [m].
@@ -92,7 +92,7 @@ class Cylinder(Placed, frozen=True, kw_only=True, tag="cylinder"):
     diameter: Diameter
 
 
-class Sphere(Placed, frozen=True, kw_only=True, tag="sphere"):
+class SphereMessage(Placed, frozen=True, kw_only=True, tag="sphere"):
     """Ball of rock.
 
     - ``diameter``: diameter of the ball [m].
@@ -101,7 +101,7 @@ class Sphere(Placed, frozen=True, kw_only=True, tag="sphere"):
     diameter: Diameter
 
 
-class Edge(Placed, frozen=True, kw_only=True, tag="edge"):
+class EdgeMessage(Placed, frozen=True, kw_only=True, tag="edge"):
     """Two flat faces that meet in a rounded edge (fillet) along y of its frame.
 
     - ``fillet_radius``: radius of the fillet [m].
@@ -112,7 +112,7 @@ class Edge(Placed, frozen=True, kw_only=True, tag="edge"):
     angle: EdgeAngle
 
 
-class Ellipsoid(Placed, frozen=True, kw_only=True, tag="ellipsoid"):
+class EllipsoidMessage(Placed, frozen=True, kw_only=True, tag="ellipsoid"):
     """Rounded boulder; its crest is an end of the last semi-axis.
 
     - ``semi_axes``: half the lengths of the boulder along x, y and z of its frame [m].
@@ -140,7 +140,7 @@ class Strips(Strict, frozen=True, kw_only=True):
     outer_right: Outline
 
 
-class Profile(Placed, frozen=True, kw_only=True, tag="profile"):
+class ProfileMessage(Placed, frozen=True, kw_only=True, tag="profile"):
     """Rock with one cross-section, an outline in x and z, drawn out along y of its frame.
 
     Outlines are smoothed to the scale of a tile. Either ``points`` or ``profiles`` is given.
@@ -153,7 +153,7 @@ class Profile(Placed, frozen=True, kw_only=True, tag="profile"):
     profiles: Strips | None = None
 
 
-class Mesh(Placed, frozen=True, kw_only=True, tag="mesh"):
+class MeshMessage(Placed, frozen=True, kw_only=True, tag="mesh"):
     """Triangle mesh of rock, open or closed.
 
     Either ``vertices`` and ``faces`` are given, or ``file``, which only the command line accepts.
@@ -169,7 +169,15 @@ class Mesh(Placed, frozen=True, kw_only=True, tag="mesh"):
     file: FileName | None = None
 
 
-Rock = Plane | Cylinder | Sphere | Edge | Ellipsoid | Profile | Mesh
+Rock = (
+    PlaneMessage
+    | CylinderMessage
+    | SphereMessage
+    | EdgeMessage
+    | EllipsoidMessage
+    | ProfileMessage
+    | MeshMessage
+)
 
 
 class RockReference(Placed, frozen=True, kw_only=True, tag="rock"):
@@ -186,7 +194,7 @@ class RockReference(Placed, frozen=True, kw_only=True, tag="rock"):
 Hold = Rock | RockReference
 
 
-class Surface(Strict, frozen=True, kw_only=True):
+class SurfaceMessage(Strict, frozen=True, kw_only=True):
     """Strength of the rock's surface under a spine tile, in the caller's numbers.
 
     Only ``shear_limit`` is needed; fields that are left out follow from the shear limit.

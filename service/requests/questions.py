@@ -25,19 +25,19 @@ from service.requests.request import (
     Identifier,
     InParts,
     Later,
-    Pose,
+    PoseMessage,
     Query,
     Tensions,
     Wrench,
 )
-from service.requests.stance import Angles, Entries, Hand, HandEntries, Stance
+from service.requests.stance import Angles, Entries, Hand, HandEntries, StanceMessage
 
 __all__ = [
     "Axis",
     "BodySpaceRequest",
     "DiagnosisRequest",
     "Draw",
-    "Move",
+    "MoveMessage",
     "ObjectiveName",
     "PlanRequest",
     "PlanWant",
@@ -125,7 +125,7 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     - ``survival``: draws of strengths for ``"want": ["survival"]``.
     """
 
-    stance: Stance
+    stance: StanceMessage
     body_wrench: Annotated[
         Wrench | None, Meta(description="that the rock must exert on the robot, in B; or load")
     ] = None
@@ -182,7 +182,7 @@ class DiagnosisRequest(Query, frozen=True, kw_only=True):
       wind up tendon [rad].
     """
 
-    stance: Stance
+    stance: StanceMessage
     body_wrench: Annotated[
         Wrench | None, Meta(description="that the rock must exert on the robot, in B; or load")
     ] = None
@@ -204,7 +204,7 @@ class WrenchSpaceRequest(Query, frozen=True, kw_only=True):
       cheap.
     """
 
-    stance: Stance
+    stance: StanceMessage
     limb: Name
     want: Annotated[
         list[SpaceWant] | None,
@@ -238,7 +238,7 @@ class BodySpaceRequest(Query, frozen=True, kw_only=True):
       any length.
     """
 
-    stance: Stance
+    stance: StanceMessage
     body_wrench: Annotated[
         Wrench | None, Meta(description="that the rock must exert on the robot, in B; or load")
     ] = None
@@ -272,7 +272,7 @@ class BodySpaceRequest(Query, frozen=True, kw_only=True):
     ] = []
 
 
-class Move(Hand, frozen=True, kw_only=True):
+class MoveMessage(Hand, frozen=True, kw_only=True):
     """Move of one limb to its next hold, as part of a climb.
 
     Besides the fields of a hand on its new hold:
@@ -284,7 +284,8 @@ class Move(Hand, frozen=True, kw_only=True):
     """
 
     body: Annotated[
-        Pose | None, Meta(description="of B in W: where the body shifts to before the limb lifts")
+        PoseMessage | None,
+        Meta(description="of B in W: where the body shifts to before the limb lifts"),
     ] = None
     joints: Annotated[
         dict[Name, Angles | Literal["solve"]] | Literal["solve"],
@@ -315,13 +316,13 @@ class RouteRequest(Query, frozen=True, kw_only=True):
     """
 
     name: Identifier = "route"
-    stance: Stance
+    stance: StanceMessage
     load: Load | None = None
     objective: ObjectiveName = "max_margin"
     limits: Limits = Limits()
-    moves: Annotated[list[Move], Meta(max_length=10_000)]
+    moves: Annotated[list[MoveMessage], Meta(max_length=10_000)]
     end: Annotated[
-        Pose | None, Meta(description="of B in W, to which the body shifts after all moves")
+        PoseMessage | None, Meta(description="of B in W, to which the body shifts after all moves")
     ] = None
     explain: Explain = True
     want: Annotated[

@@ -20,7 +20,7 @@ __all__ = [
     "Identifier",
     "InParts",
     "Later",
-    "Pose",
+    "PoseMessage",
     "Query",
     "ReplyBytes",
     "Request",
@@ -87,7 +87,7 @@ InParts = Annotated[
 Later = Annotated[Any, Meta(description="not supported in this version; leave it out")]
 
 
-class Pose(Strict, frozen=True, kw_only=True):
+class PoseMessage(Strict, frozen=True, kw_only=True):
     """Pose of a frame in another frame; its orientation in exactly one of three forms.
 
     - ``position``: origin of the frame [m].

@@ -9,14 +9,14 @@ from msgspec import Meta
 from hand_models.base import Acceleration, Coordinate, Name, Position, Strict
 from hand_models.hand import Grasp, Placing, WristTravel
 from planner import LimbStiffness
-from service.requests.holds import Hold, Rock, Surface
-from service.requests.request import FourTensions, Pose, WrenchEntries, WrenchEntry
+from service.requests.holds import Hold, Rock, SurfaceMessage
+from service.requests.request import FourTensions, PoseMessage, WrenchEntries, WrenchEntry
 
 __all__ = [
     "Angles",
     "Hand",
     "Place",
-    "Stance",
+    "StanceMessage",
 ]
 
 Preload = Annotated[
@@ -118,7 +118,7 @@ class Hand(Strict, frozen=True, kw_only=True):
     """
 
     limb: Name
-    pose: Annotated[Pose | None, Meta(description="of H in W")] = None
+    pose: Annotated[PoseMessage | None, Meta(description="of H in W")] = None
     place: Annotated[
         Place | None,
         Meta(
@@ -127,7 +127,7 @@ class Hand(Strict, frozen=True, kw_only=True):
         ),
     ] = None
     hold: Hold
-    surface: Annotated[Name | Surface, Meta(description="a preset's name, or numbers")]
+    surface: Annotated[Name | SurfaceMessage, Meta(description="a preset's name, or numbers")]
     grasp: Grasp = Grasp()
     wrist: Annotated[
         Literal["fixed", "floating", "compliant"],
@@ -174,7 +174,7 @@ class Hand(Strict, frozen=True, kw_only=True):
     ] = None
 
 
-class Stance(Strict, frozen=True, kw_only=True):
+class StanceMessage(Strict, frozen=True, kw_only=True):
     """Stance of the robot: pose of the body, and all hands on their holds.
 
     - ``robot``: name of the robot; by default the robot that is served or given by ``--robot``, or
@@ -198,7 +198,7 @@ class Stance(Strict, frozen=True, kw_only=True):
     ] = None
     hand: HandEntries | None = None
     gravity: Acceleration | None = None
-    body: Annotated[Pose, Meta(description="of B in W")]
+    body: Annotated[PoseMessage, Meta(description="of B in W")]
     joints: Annotated[
         dict[Name, Angles | Literal["solve"]] | Literal["solve"] | None,
         Meta(

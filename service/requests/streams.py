@@ -9,7 +9,7 @@ from msgspec import Meta
 from hand_models.base import Name
 from planner import Limits, Load, LostTile
 from service.requests.request import Detail, Query, Request, Wrench
-from service.requests.stance import Stance
+from service.requests.stance import StanceMessage
 
 __all__ = ["LostTiles", "SetPointsRequest", "StreamRequest", "WrenchRequest"]
 
@@ -42,7 +42,7 @@ class StreamRequest(Query, frozen=True, kw_only=True):
     - ``lost``: tiles that have slipped before; fixed wrists only.
     """
 
-    stance: Stance
+    stance: StanceMessage
     body_wrench: Annotated[Wrench | None, Meta(description="the first centre, in B; or load")] = (
         None
     )

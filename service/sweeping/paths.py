@@ -15,9 +15,9 @@ import msgspec
 from msgspec import inspect
 
 from hand_models.base import InvalidInputError
-from hand_models.tile import Surface as Preset
+from hand_models.tile import Surface
 from planner import EARTH_GRAVITY
-from service.requests import PlanRequest, Stance, Surface
+from service.requests import PlanRequest, StanceMessage, SurfaceMessage
 from service.wire import PossibleType, entered, field_names, places_at
 
 __all__ = ["Paths", "Steps", "Target", "set_value"]
@@ -94,7 +94,7 @@ class Paths:
             valid names.
         """
         names = path.replace("[", ".").replace("]", "").split(".")
-        if names[0] in _fields(Stance):
+        if names[0] in _fields(StanceMessage):
             names.insert(0, "stance")
         found: list[tuple[Steps, list[PossibleType]]] = [((), places_at(PlanRequest, ()))]
         for name in names:
@@ -128,7 +128,7 @@ class Paths:
         """
         given = set(varied)
         for steps, name in self.presets.items():
-            preset = Preset.named(name)
+            preset = Surface.named(name)
             share = _at(self.document, steps)["shear_limit"] / preset.shear_limit
             # its parameter file gives these over its shear limit
             for key in ("pull_off_limit", "lateral_limit", "shear_scatter"):
@@ -157,7 +157,7 @@ class Paths:
                 for i, key in enumerate(keys)
             }
         if name not in (*known, *several):
-            more = "" if steps else f"; and of the stance {', '.join(_fields(Stance))}"
+            more = "" if steps else f"; and of the stance {', '.join(_fields(StanceMessage))}"
             raise InvalidInputError(
                 f"{words} has no {name!r}; known are {', '.join(listed + several)}{more}",
                 field=path,
@@ -178,8 +178,8 @@ class Paths:
             )
             set_value(self.document, steps, value)
         elif isinstance(value, str) and any(_is_surface(kind) for kind in kinds):
-            self.presets[steps], preset = value, Preset.named(value)
-            value = {key: getattr(preset, key) for key in _fields(Surface)}
+            self.presets[steps], preset = value, Surface.named(value)
+            value = {key: getattr(preset, key) for key in _fields(SurfaceMessage)}
             set_value(self.document, steps, value)
         if isinstance(value, (dict, list)):
             return value
@@ -283,7 +283,7 @@ def _fields(kind: type) -> list[str]:
 
 
 def _is_surface(kind: inspect.Type) -> bool:
-    return isinstance(kind, inspect.StructType) and kind.cls is Surface
+    return isinstance(kind, inspect.StructType) and kind.cls is SurfaceMessage
 
 
 def _meant(places: list[PossibleType], value: Any) -> list[PossibleType]:

@@ -12,7 +12,7 @@ import msgspec
 from hand_models.parameters import ParameterTable
 from planner import LimitName
 from service import bulk
-from service.bulk import LOCAL_CLUSTER, Column, TableLines, evaluate
+from service.bulk import LOCAL_CLUSTER, Column, TableLines, answer_all
 from service.processes import worth
 from service.replies import ErrorDetail
 from service.requests import PlanRequest
@@ -180,7 +180,7 @@ def asking(
         workers = worth(count, workers)
         on = "here" if workers == 1 else "processes"
     place = LOCAL_CLUSTER if on == "local" else on
-    return partial(evaluate, on=place, workers=workers, robot=robot, form=Format.MSGPACK)
+    return partial(answer_all, on=place, workers=workers, robot=robot, form=Format.MSGPACK)
 
 
 def rows_at(design: Design, points: Sequence[Point], ask: Ask) -> Iterator[SweepRow]:

@@ -87,7 +87,7 @@ def schema() -> dict[str, Any]:
     names = {name: part_name(part["title"]) for name, part in parts.items()}
     assert len({*names.values()}) == len(parts)
     for name, part in parts.items():
-        if part["title"].endswith("Reply"):
+        if part["title"].endswith(("Reply", "Message")):
             part["title"] = names[name]
         # fields of later versions are left out
         for field in LATER_FIELDS.keys() & part.get("properties", {}).keys():
@@ -124,7 +124,7 @@ def schema() -> dict[str, Any]:
 
 
 def part_name(title: str) -> str:
-    """Return a class's name in the schema, without type parameters and mostly without ``Reply``.
+    """Return a class's name in the schema, without type parameters, ``Message`` or ``Reply``.
 
     Parameters
     ----------
@@ -134,10 +134,10 @@ def part_name(title: str) -> str:
     Returns
     -------
     str
-        Name of the class; without the ending ``Reply`` if the class is only a part of a reply, and
-        no part of a request has the same name.
+        Name of the class without ``Message``; without ``Reply`` if the class is only a part of a
+        reply, and no part of a request has the same name.
     """
-    name = title.partition("[")[0]
+    name = title.partition("[")[0].removesuffix("Message")
     short = name.removesuffix("Reply")
     # a part of a request has this name, too
     alike = short == "Hand"
@@ -147,13 +147,12 @@ def part_name(title: str) -> str:
 def _renamed(part: Any, names: Mapping[str, str]) -> Any:
     """Return a part of the schema with its references renamed."""
     if isinstance(part, dict):
-        return {
-            key: f"#/$defs/{names[value.removeprefix('#/$defs/')]}"
-            if key == "$ref"
-            else _renamed(value, names)
-            for key, value in part.items()
-        }
-    return [_renamed(each, names) for each in part] if isinstance(part, list) else part
+        return {key: _renamed(value, names) for key, value in part.items()}
+    if isinstance(part, list):
+        return [_renamed(each, names) for each in part]
+    if isinstance(part, str) and part.startswith("#/$defs/"):
+        return f"#/$defs/{names[part.removeprefix('#/$defs/')]}"
+    return part
 
 
 def _exchange(

@@ -19,8 +19,8 @@ from hand_models.compliance import (
     linear_extreme,
     pieces,
     pose_units,
-    search,
     search_box,
+    search_grid,
     wrist_pose,
 )
 from hand_models.finger import FingerModel, settle_finger
@@ -168,7 +168,7 @@ def test_an_impossible_gripper_is_refused(diameter, tension, field):
 
 
 def test_the_search_finds_what_a_plain_grid_finds_and_more():
-    found = search(GRIPPER, 25)
+    found = search_grid(GRIPPER, 25)
     assert found.tried == 25**3
     assert 0 < found.held < found.tried
     # poses on the boundary: nothing lets go, and a hair further something does
@@ -185,7 +185,7 @@ def test_the_search_finds_what_a_plain_grid_finds_and_more():
 
 
 def test_a_finer_search_and_rays_agree():
-    coarse, rays = search(CAPPED, 40), boundary(CAPPED, search_box(CAPPED), 3000)
+    coarse, rays = search_grid(CAPPED, 40), boundary(CAPPED, search_box(CAPPED), 3000)
     for way in np.random.default_rng(0).normal(size=(50, 3)):
         direction = planar(way / np.linalg.norm(way) * WRENCH_SCALE[list(PLANAR_COMPONENTS)])
         # in shares of the set's size: both miss the very corners
@@ -205,13 +205,13 @@ def test_the_set_is_skew_symmetric():
 
 def test_a_closing_that_is_too_tight_leaves_nothing():
     with pytest.raises(EmptySetError):
-        search(Gripper(0.3, 300.0), 15)
+        search_grid(Gripper(0.3, 300.0), 15)
 
 
 @pytest.mark.slow
 def test_the_search_of_a_whole_hand_reaches_as_far_as_the_linear_programs_nearly():
     wrist = floating(surface="sandpaper-36")
-    found = search(wrist, 4)
+    found = search_grid(wrist, 4)
     assert found.tried == 4**6
     assert (wrist.evaluate(found.poses).utilisation <= 1.0).all()
     for i in range(6):

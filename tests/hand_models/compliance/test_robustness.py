@@ -29,8 +29,8 @@ from hand_models.compliance import (
     boundary,
     farthest,
     linear_box,
-    search,
     search_box,
+    search_grid,
     wrist_pose,
 )
 from tests.suite.helpers.hands import HAND, PINCH, ROCK, changed_hand, settled_at
@@ -92,11 +92,11 @@ def test_a_search_is_about_a_pose_that_holds(seed: int) -> None:
 @pytest.mark.parametrize("per_axis", [-1, 0, 1])
 def test_a_grid_without_poses_is_refused(per_axis: int) -> None:
     with pytest.raises(InvalidInputError, match="per_axis"):
-        search(Gripper(0.3, 37.0), per_axis)
+        search_grid(Gripper(0.3, 37.0), per_axis)
 
 
 def test_a_grid_of_which_one_pose_holds_has_a_wrench_but_no_hull() -> None:
-    found = search(Gripper(0.3, 37.0), 3)
+    found = search_grid(Gripper(0.3, 37.0), 3)
     assert found.held == len(found.wrenches) == 1
     with pytest.raises(EmptySetError, match="no volume"):
         _ = found.hull

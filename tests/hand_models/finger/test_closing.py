@@ -19,7 +19,7 @@ from hand_models.finger import (
 )
 from hand_models.hand.tightening import resting_tensions
 from hand_models.rock import Profile
-from hand_models.sections import Disc, FingerRock, PolylineSection, Wall
+from hand_models.sections import Disc, FingerRock, FlatRock, PolylineSection
 from tests.suite.helpers.fingers import (
     GRASPS,
     any_hold,
@@ -248,12 +248,12 @@ def test_on_a_cylinder_phalanges_come_to_the_rock_one_after_the_other():
 
 
 def test_on_flat_rock_a_path_ends_as_laid():
-    closed = close_one(Wall(1j, H), ROCK, 37.0)
+    closed = close_one(FlatRock(1j, H), ROCK, 37.0)
     np.testing.assert_allclose(closed.finger.joint_angles, 0.0, atol=1e-4)
     assert kinds(closed) == [("face", None)] * 3
     along = [contact.along for contact in closed.finger.contacts]
     np.testing.assert_allclose(along, MODEL.tile_centre, atol=2e-4)
-    laid = settle_finger(MODEL, Wall(1j, H), (0.0, 0.0))
+    laid = settle_finger(MODEL, FlatRock(1j, H), (0.0, 0.0))
     normals = laid.normals(laid.shears(37.0)) @ [1.0, 37.0]
     np.testing.assert_allclose(closed.normals @ [1.0, 37.0], normals, atol=0.2)
 
@@ -366,7 +366,7 @@ def test_the_same_rock_told_otherwise_is_the_same(seed):
     into = complex(-math.sin(turn), math.cos(turn))
     offset = float(rng.uniform(H, 0.03))
     line = into * (offset + 1j * np.array([0.3, -0.3]))
-    flat = close_one(Wall(complex(into.real, into.imag), offset), ROCK, 37.0)
+    flat = close_one(FlatRock(complex(into.real, into.imag), offset), ROCK, 37.0)
     drawn = close_one(
         PolylineSection([np.column_stack([line.real, line.imag])], faceted=True), ROCK, 37.0
     )
@@ -437,14 +437,14 @@ def test_a_finger_that_snaps_ends_alike_at_every_tension():
 
 
 def test_a_finger_in_the_rock_says_how_deep_and_how_to_leave_it():
-    section = Wall(1j, -0.06)
+    section = FlatRock(1j, -0.06)
     refused = close_one(section, ROCK, 37.0)
     assert isinstance(refused, Refused)
     # its joint is that deep, and the tiles' faces or the bar's end deeper still
     assert 0.06 < refused.depth < 0.2
-    higher = close_one(Wall(1j, -0.06 + refused.lift + 1e-6), ROCK, 37.0)
+    higher = close_one(FlatRock(1j, -0.06 + refused.lift + 1e-6), ROCK, 37.0)
     assert isinstance(higher, ClosedFinger)
-    lower = close_one(Wall(1j, -0.06 + refused.lift - 1e-4), ROCK, 37.0)
+    lower = close_one(FlatRock(1j, -0.06 + refused.lift - 1e-4), ROCK, 37.0)
     assert isinstance(lower, Refused)
 
 
@@ -460,11 +460,11 @@ def test_a_finger_amid_rock_cannot_be_lifted_out_of_it():
 
 
 def test_a_straight_finger_clings_where_no_rock_is_in_its_way():
-    free = cling(MODEL, Wall(1j, 0.008))
+    free = cling(MODEL, FlatRock(1j, 0.008))
     assert isinstance(free, ClosedFinger)
     np.testing.assert_array_equal(free.finger.joint_angles, 0.0)
     assert not free.finger.bearing
-    deep = cling(MODEL, Wall(1j, 0.002))
+    deep = cling(MODEL, FlatRock(1j, 0.002))
     assert isinstance(deep, Refused)
     assert deep.depth == pytest.approx(H - 0.002, abs=5e-5)
     assert isinstance(cling(MODEL, None), ClosedFinger)

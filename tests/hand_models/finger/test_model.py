@@ -13,7 +13,7 @@ from hypothesis import given, strategies as st
 
 from hand_models import Plane, spiny_hand
 from hand_models.finger import Contact, SettledFinger, settle_finger
-from hand_models.sections import SECTION_SETTINGS, Disc, Wall
+from hand_models.sections import SECTION_SETTINGS, Disc, FlatRock
 from tests.suite.helpers.rocks import distance, random_axes, random_hold
 
 MODEL = spiny_hand().finger
@@ -159,7 +159,7 @@ def test_phalanges_form_a_chain_within_their_joints_limits(seed):
 
 
 def test_on_flat_rock_at_tile_height_every_tile_lies_flat_at_its_centre():
-    finger = settle_finger(MODEL, Wall(1j, H), (0.0, 0.0))
+    finger = settle_finger(MODEL, FlatRock(1j, H), (0.0, 0.0))
     np.testing.assert_allclose(finger.joint_angles, 0.0, atol=1e-12)
     assert [c.along for c in finger.contacts] == [MODEL.tile_centre] * 3
     assert all(finger.touching)

@@ -9,7 +9,7 @@ from hand_models.finger.model import FingerModel
 from hand_models.finger.path_state import OpenFinger, drives
 from hand_models.finger.phalanx_shape import PhalanxShape, fan_out
 from hand_models.parameters import ParameterTable, own_hand
-from hand_models.sections import Disc, FingerRock, Outlines, Wall
+from hand_models.sections import Disc, FingerRock, FlatRock, Outlines
 from hand_models.tile import Surface
 from tests.suite.helpers import phalanges
 from tests.suite.helpers.hands import HAND
@@ -30,7 +30,7 @@ def beside(section, angle, joint=0.0, depth=DEPTH):
 
 
 def flat(offset):
-    return Wall(1j, offset)
+    return FlatRock(1j, offset)
 
 
 def test_a_bar_is_as_high_as_its_tile_and_as_thick_as_the_frame():
@@ -87,12 +87,12 @@ def test_the_force_keeps_its_place_on_a_bulge_that_moves(radius):
 
 def test_the_end_of_a_phalanx_presses_as_a_disc():
     """On rock right ahead of it, and on rock behind its back."""
-    wall = Wall(1.0 + 0j, SHAPE.end + SHAPE.radius)
+    wall = FlatRock(1.0 + 0j, SHAPE.end + SHAPE.radius)
     found = beside(wall, 0.0)
     assert found.gap == pytest.approx(0.0, abs=8.0 * SHAPE.fine)
     assert found.place == pytest.approx(SHAPE.end + SHAPE.radius, abs=3e-4)
     assert found.push == pytest.approx(1.0, abs=0.05)
-    behind = Wall(-1j, SHAPE.radius)
+    behind = FlatRock(-1j, SHAPE.radius)
     found = beside(behind, 0.0)
     assert found.gap == pytest.approx(0.0, abs=8.0 * SHAPE.fine)
     assert found.place == pytest.approx(complex(SHAPE.end, -SHAPE.radius), abs=5e-3)
@@ -127,7 +127,7 @@ def test_the_gap_falls_by_the_arm_of_the_push(seed):
     rng = np.random.default_rng(seed)
     if rng.random() < 0.5:
         turn = rng.uniform(-0.5, 0.8)
-        section = Wall(1j * np.exp(1j * turn), float(rng.uniform(0.005, 0.03)))
+        section = FlatRock(1j * np.exp(1j * turn), float(rng.uniform(0.005, 0.03)))
     else:
         r = float(rng.uniform(0.01, 0.3))
         section = Disc(complex(rng.uniform(0.0, 0.1), r + rng.uniform(0.0, 0.03)), r)

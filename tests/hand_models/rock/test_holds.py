@@ -8,7 +8,7 @@ from hypothesis import given, strategies as st
 from scipy.optimize import minimize_scalar
 
 from hand_models import Cylinder, Edge, InvalidInputError, Plane, Sphere
-from hand_models.sections import Disc, Face, Wall
+from hand_models.sections import Disc, Face, FlatRock
 from hand_models.sections.ellipses import Ellipse
 from tests.suite.helpers.rocks import distance, random_axes, random_hold
 
@@ -83,7 +83,7 @@ def test_a_finger_along_the_axis_lies_on_straight_rock():
         for hold in [Cylinder(0.3), Edge(0.1, 1.2)]:
             origin = np.array([0.05, 0.0, -0.02])
             cut = Cut(hold, origin, np.array([0.0, way, 0.0]), np.array([0.0, 0.0, 1.0]))
-            assert isinstance(cut.section, Wall)
+            assert isinstance(cut.section, FlatRock)
             angle, distance, flat = cut.section.rest(0j, Face(0.01, 0.04, 0.0), LOW, HIGH)
             assert (distance, flat) == (0.04, False)
             assert 0.0 < angle < math.pi / 2

@@ -10,9 +10,9 @@ from hand_models import Cylinder, Edge
 from hand_models.sections import (
     Disc,
     FingerRock,
+    FlatRock,
     Outlines,
     PolylineSection,
-    Wall,
 )
 from hand_models.sections.ellipses import Ellipse
 from tests.suite.helpers.rocks import random_axes, random_ellipsoid, random_mesh, random_profile
@@ -34,7 +34,7 @@ def random_smooth(rng):
     kind = rng.integers(5)
     if kind == 0:
         turn = rng.uniform(-3.0, 3.0)
-        return Wall(complex(math.cos(turn), math.sin(turn)), float(rng.uniform(-0.1, 0.1)))
+        return FlatRock(complex(math.cos(turn), math.sin(turn)), float(rng.uniform(-0.1, 0.1)))
     if kind == 1:
         centre = rng.uniform(-0.1, 0.1, 2)
         return Disc(complex(*centre), float(rng.uniform(0.01, 0.3)))
@@ -98,7 +98,7 @@ def test_distances_of_many_places_are_their_clearances_one_by_one(kind, seed):
 
 @pytest.mark.parametrize("offset", [0.0, 0.05, -0.1])
 def test_flat_rock_is_as_long_as_within_reach(offset):
-    points, lengths = outlines(Wall(complex(0.6, 0.8), offset))
+    points, lengths = outlines(FlatRock(complex(0.6, 0.8), offset))
     assert lengths.sum() == pytest.approx(2.0 * math.sqrt(REACH**2 - offset**2), abs=2 * SPACING)
     np.testing.assert_allclose((points * (0.6 - 0.8j)).real, offset, atol=1e-12)
 
@@ -165,7 +165,7 @@ def test_closed_rock_is_seen_all_around():
 
 def test_what_is_out_of_reach_is_left_out():
     for section in (
-        Wall(1j, 0.2),
+        FlatRock(1j, 0.2),
         Disc(0.5j, 0.3),
         PolylineSection([np.array([[-1.0, 0.2], [1.0, 0.2]])]),
         None,
@@ -175,7 +175,7 @@ def test_what_is_out_of_reach_is_left_out():
 
 
 def test_fingers_with_less_rock_are_filled_with_places_far_off():
-    rock = Outlines.of([FingerRock(None), FingerRock(Wall(1j, 0.0))], REACH, SPACING)
+    rock = Outlines.of([FingerRock(None), FingerRock(FlatRock(1j, 0.0))], REACH, SPACING)
     assert rock.points.shape == rock.lengths.shape
     assert rock.points.shape[0] == 2
     assert (np.abs(rock.points[0]) > 100.0).all()

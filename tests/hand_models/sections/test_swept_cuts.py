@@ -157,8 +157,8 @@ def test_the_kinds_of_cuts():
         for axes in (level, tilted)
     }
     assert names == {
-        ("Plane", True): "Wall",
-        ("Plane", False): "Wall",
+        ("Plane", True): "FlatRock",
+        ("Plane", False): "FlatRock",
         ("Cylinder", True): "Disc",
         ("Cylinder", False): "Ellipse",
         ("Sphere", True): "Disc",

@@ -75,7 +75,7 @@ def test_the_reply_is_what_was_found() -> None:
 @pytest.mark.slow
 def test_the_route_of_the_reply_has_the_stages_of_the_climb() -> None:
     reply = climb_reply(REQUEST, sought())
-    rock = requests.Ellipsoid(semi_axes=tuple(sought().rock.semi_axes))
+    rock = requests.EllipsoidMessage(semi_axes=tuple(sought().rock.semi_axes))
     stance = changed(reply.route.stance, rocks={"rock": rock})
     again = msgspec.json.decode(
         msgspec.json.encode(changed(reply.route, stance=stance)), type=requests.RouteRequest

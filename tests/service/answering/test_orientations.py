@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from planner.result import Advice
 from service.answering import advised, questions, rewritten
-from service.requests import PlanRequest, Pose, RouteRequest
+from service.requests import PlanRequest, PoseMessage, RouteRequest
 from service.wire import decode_request
 from tests.suite.helpers.replies import reply_to
 from tests.suite.helpers.requests import JSON, MSGPACK, wall_request
@@ -81,5 +81,5 @@ def test_advice_replaces_a_pose_whatever_its_form():
     changed = advised(
         request, Advice("body", [], "", {"stance.body": pose}, 1.0, "optimal", 0.5, None, True)
     )
-    assert changed.stance.body == msgspec.convert(pose, Pose)
+    assert changed.stance.body == msgspec.convert(pose, PoseMessage)
     assert decode_request(rewritten(text, request, changed), PlanRequest) == changed

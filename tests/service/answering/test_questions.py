@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from service.answering import questions
-from service.requests import Surface
+from service.requests import SurfaceMessage
 from tests.suite.helpers.requests import (
     JOINTS,
     full_request,
@@ -70,7 +70,7 @@ def test_every_number_of_a_surface_is_in_the_question() -> None:
         "friction": 0.3,
         "pull_off_exponent": 2.0,
     }
-    assert set(own) == set(Surface.__struct_fields__)
+    assert set(own) == set(SurfaceMessage.__struct_fields__)
     request = wall_request()
     request["stance"]["hands"][0]["surface"] = own
     asked = questions.question(plan_request(request)).stance.hands[0].surface

@@ -14,7 +14,7 @@ from hypothesis import given, strategies as st
 from hand_models.base import CruxError, InvalidInputError, LimitError
 from service.answering import Streams, handle
 from service.answering.reply_sizes import fitted
-from service.bulk import evaluate
+from service.bulk import answer_all
 from service.commands.options import with_extras
 from service.commands.stances import read_request
 from service.replies import ClimbReply, ErrorReply
@@ -315,8 +315,8 @@ def test_a_person_reads_all_of_it() -> None:
 
 def test_rows_of_a_table_are_told_whatever_their_replies_would_take() -> None:
     request = wall_request() | {"max_reply_bytes": LEAST_REPLY_BYTES}
-    (brief,) = evaluate([msgspec.json.encode(request)], brief=True)
-    (reply,) = evaluate([msgspec.json.encode(request)])
+    (brief,) = answer_all([msgspec.json.encode(request)], brief=True)
+    (reply,) = answer_all([msgspec.json.encode(request)])
     assert brief.status == "optimal"
     assert not reply.good
     assert error_of(reply)[0] == "limit"

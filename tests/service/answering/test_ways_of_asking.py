@@ -267,7 +267,7 @@ def parts(kind: Any, seen: set[type]) -> Iterator[type]:
 
 
 FIELDS = [
-    f"{part.__name__}.{entry.name}"
+    f"{part.__name__.removesuffix('Message')}.{entry.name}"
     for part in parts(PlanRequest, set())
     for entry in msgspec.structs.fields(part)
 ]

@@ -19,7 +19,7 @@ import pytest
 from hand_models.base import CruxError
 from planner import BodyGrid, PlaceGrid
 from service import sweep
-from service.bulk import evaluate
+from service.bulk import answer_all
 from service.bulk.chunks import BulkSettings
 from service.commands.stances import read_request, read_route
 from service.requests import ClimbEnd, ClimbRequest
@@ -48,10 +48,10 @@ def client() -> Iterator[object]:
 
 def test_a_cluster_answers_to_the_last_digit_as_this_process_does(client):
     asked = encoded(CASES)
-    here = [timeless(answer.payload) for answer in evaluate(asked, "here")]
-    assert [timeless(answer.payload) for answer in evaluate(asked, client)] == here
+    here = [timeless(answer.payload) for answer in answer_all(asked, "here")]
+    assert [timeless(answer.payload) for answer in answer_all(asked, client)] == here
     address = client.scheduler_info()["address"]
-    assert [timeless(answer.payload) for answer in evaluate(asked, address)] == here
+    assert [timeless(answer.payload) for answer in answer_all(asked, address)] == here
     # the client is its owner's
     assert client.status == "running"
 
@@ -59,7 +59,7 @@ def test_a_cluster_answers_to_the_last_digit_as_this_process_does(client):
 def test_routes_and_sweeps_come_to_the_same_on_a_cluster(client):
     route = read_route("six-moves")
     asked = [msgspec.structs.replace(route, id=str(i)) for i in range(3)]
-    here, there = (list(evaluate(asked, on, kind=ServiceName.ROUTE)) for on in ("here", client))
+    here, there = (list(answer_all(asked, on, kind=ServiceName.ROUTE)) for on in ("here", client))
     assert [answer.payload for answer in there] == [answer.payload for answer in here]
     wall, varied = read_request("wall-300"), ["load.mass=60:120:7"]
     alone, spread = (sweep(wall, varied, on=on) for on in ("here", client))
@@ -78,7 +78,7 @@ def test_climbs_come_to_the_same_on_a_cluster(client):
         for seed in (1, 2)
     ]
     here, there = (
-        [json.loads(answer.payload) for answer in evaluate(asked, on, kind=ServiceName.CLIMB)]
+        [json.loads(answer.payload) for answer in answer_all(asked, on, kind=ServiceName.CLIMB)]
         for on in ("here", client)
     )
     for reply in (*here, *there):
@@ -95,7 +95,7 @@ def test_questions_without_end_go_to_a_cluster_as_they_are_answered(client):
         for taken in itertools.count(1):
             yield msgspec.json.encode({"v": 1, "id": str(taken)})
 
-    answers = evaluate(endless(), client)
+    answers = answer_all(endless(), client)
     found = [json.loads(answer.payload)["id"] for answer in itertools.islice(answers, 500)]
     answers.close()
     assert found == [str(i) for i in range(1, 501)]
@@ -105,7 +105,7 @@ def test_questions_without_end_go_to_a_cluster_as_they_are_answered(client):
 def test_a_worker_that_is_killed_is_replaced(client):
     asked = encoded([wall_request(HEAVY + i / 100) | {"id": str(i)} for i in range(120)])
     killed, found = [], []
-    for answer in evaluate(asked, client):
+    for answer in answer_all(asked, client):
         found.append(timeless(answer.payload))
         if len(found) == 10:
             killed = list(client.run(os.getpid).values())[:1]
@@ -133,7 +133,7 @@ def test_a_cluster_without_workers_is_told_and_waited_for(monkeypatch):
         log, hire = logging.getLogger("service.bulk.pools"), Hire()
         log.addHandler(hire)
         try:
-            answers = evaluate(asked, client)
+            answers = answer_all(asked, client)
             found = [next(answers)]
             cluster.scale(0)
             while client.nthreads():
@@ -151,7 +151,7 @@ def test_no_scheduler_is_told(monkeypatch):
     settings = BulkSettings(scheduler_timeout=0.5)
     monkeypatch.setattr("service.bulk.pools.BULK_SETTINGS", settings)
     with pytest.raises(CruxError, match=r"no Dask scheduler with a worker answers at tcp://"):
-        list(evaluate([b"{}"], "tcp://127.0.0.1:9"))
+        list(answer_all([b"{}"], "tcp://127.0.0.1:9"))
 
 
 def dask(*words: str) -> subprocess.Popen[bytes]:

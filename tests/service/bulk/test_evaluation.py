@@ -16,10 +16,10 @@ from hypothesis import given, strategies as st
 from hand_models.base import CruxError, InvalidInputError
 from planner.processes import Workers
 from service.answering import dispatch
-from service.bulk import answer_chunk, answered, evaluate
+from service.bulk import answer_all, answer_chunk, answered
 from service.bulk.chunks import BULK_SETTINGS, About, Setting, about, grouping_order, own_versions
 from service.bulk.pools import Here
-from service.requests import ClimbEnd, ClimbRequest, Mesh, PlanRequest
+from service.requests import ClimbEnd, ClimbRequest, MeshMessage, PlanRequest
 from service.wire import Format
 from tests.suite.helpers import workshop
 from tests.suite.helpers.random_requests import random_request
@@ -78,16 +78,16 @@ def test_a_chunk_is_answered_as_its_questions_are_alone():
 
 def test_processes_answer_to_the_last_digit_as_this_one_does():
     asked = encoded(CASES)
-    here = [timeless(answer.payload) for answer in evaluate(asked, "here")]
+    here = [timeless(answer.payload) for answer in answer_all(asked, "here")]
     assert [reply.get("id") for reply in here] == [case["id"] for case in CASES]
-    everywhere = list(evaluate(asked, workers=2))
+    everywhere = list(answer_all(asked, workers=2))
     assert [timeless(answer.payload) for answer in everywhere] == here
 
 
 def test_requests_may_be_objects_in_either_format():
     wrong = msgspec.structs.replace(plan_request(), id="x", body_wrench=(object(),) * 6)
     for form in Format:
-        good, bad = evaluate([plan_request(), wrong], "here", form=form)
+        good, bad = answer_all([plan_request(), wrong], "here", form=form)
         assert form.decode(good.payload, dict)["status"] == "optimal"
         assert form.decode(bad.payload, dict)["id"] == "x"
         assert (bad.good, bad.status) == (False, "malformed")
@@ -97,7 +97,7 @@ def test_explanations_are_left_out_or_asked_for_whatever_requests_say():
     asked = [msgspec.json.encode(wall_request(HEAVY) | more) for more in ({}, {"explain": False})]
     for explain, expected in ((None, [True, False]), (True, [True] * 2), (False, [False] * 2)):
         replies = [
-            json.loads(answer.payload) for answer in evaluate(asked, "here", explain=explain)
+            json.loads(answer.payload) for answer in answer_all(asked, "here", explain=explain)
         ]
         assert [reply["certificate"] is not None for reply in replies] == expected
         assert {reply["status"] for reply in replies} == {"overloaded"}
@@ -149,10 +149,10 @@ def test_processes_that_cannot_start_end_the_work():
 def test_no_place_to_work_at_is_told():
     for on in ("nowhere", 3):
         with pytest.raises(InvalidInputError, match=r"distributed|valid are processes"):
-            list(evaluate([], on))
+            list(answer_all([], on))
     for workers in (0, -1, True):
         with pytest.raises(InvalidInputError, match="at least 1"):
-            list(evaluate([], workers=workers))
+            list(answer_all([], workers=workers))
 
 
 def test_another_version_is_not_answered():
@@ -245,10 +245,10 @@ def test_the_rock_of_a_climb_may_be_a_file(tmp_path):
     text = "OFF\n3 1 0\n0 0 0\n0 1 0\n1 0 0\n3 0 2 1\n"
     (tmp_path / "rock.off").write_text(text)
     ends = {"start": ClimbEnd(height=0.0), "goal": ClimbEnd(height=1.0)}
-    asked = [ClimbRequest(v=1, rock=Mesh(file="rock.off"), **ends)]
+    asked = [ClimbRequest(v=1, rock=MeshMessage(file="rock.off"), **ends)]
 
     def field(**options):
-        (answer,) = evaluate(asked, "here", kind="climb", **options)
+        (answer,) = answer_all(asked, "here", kind="climb", **options)
         return json.loads(answer.payload)["error"]["field"]
 
     assert field(folder=tmp_path) == "bodies.sample"

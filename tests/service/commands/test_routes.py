@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from service.bulk import evaluate
+from service.bulk import answer_all
 from service.commands.cli import run_command_line
 from service.commands.stances import read_route
 from service.replies import RouteReply
@@ -164,7 +164,7 @@ def test_processes_are_ended_and_what_is_whole_is_kept(climbs, tmp_path):
 def test_routes_are_questions_of_bulk_work_in_processes_too(climbs):
     asked = [read_route(str(climbs / name)) for name in ("a.json", "c.json")]
     here, there = (
-        list(evaluate(asked, on, kind=ServiceName.ROUTE)) for on in ("here", "processes")
+        list(answer_all(asked, on, kind=ServiceName.ROUTE)) for on in ("here", "processes")
     )
     assert [each.payload for each in here] == [each.payload for each in there]
     first, second = (msgspec.json.decode(each.payload, type=RouteReply) for each in here)

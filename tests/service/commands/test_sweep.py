@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from service.bulk import evaluate
+from service.bulk import answer_all
 from service.commands.cli import run_command_line
 from service.processes import Interrupted
 from service.wire import LostError, encode_error
@@ -132,11 +132,11 @@ def test_numbers_of_a_hand_of_ones_own_count(tmp_path, capfd):
 def test_a_point_that_is_lost_is_a_failure(tmp_path, capfd, monkeypatch):
 
     def losing(questions, **options):
-        for i, answer in enumerate(evaluate(questions, **options)):
+        for i, answer in enumerate(answer_all(questions, **options)):
             lost = encode_error(LostError("its process died"), options["form"])
             yield lost if i == 1 else answer
 
-    monkeypatch.setattr("service.sweeping.rows.evaluate", losing)
+    monkeypatch.setattr("service.sweeping.rows.answer_all", losing)
     values = "load.mass=60,80,100"
     assert (
         run_command_line(["sweep", "wall-300", "--vary", values, "-o", str(tmp_path), "--json"])
@@ -150,10 +150,10 @@ def test_a_point_that_is_lost_is_a_failure(tmp_path, capfd, monkeypatch):
 def test_what_is_answered_is_kept(tmp_path, capfd, monkeypatch):
 
     def interrupted(questions, **options):
-        yield next(evaluate(questions, **options))
+        yield next(answer_all(questions, **options))
         raise Interrupted
 
-    monkeypatch.setattr("service.sweeping.rows.evaluate", interrupted)
+    monkeypatch.setattr("service.sweeping.rows.answer_all", interrupted)
     with pytest.raises(Interrupted) as caught:
         run_command_line(["sweep", "wall-300", "--vary", MASS, "-o", str(tmp_path)])
     table = tmp_path / "sweep.csv"
@@ -180,14 +180,14 @@ STOPPING = """
 import itertools, threading
 from service.sweeping import rows
 
-evaluate = rows.evaluate
+answer_all = rows.answer_all
 
 def first(questions, **options):
-    yield from itertools.islice(evaluate(questions, **options), 400)
+    yield from itertools.islice(answer_all(questions, **options), 400)
     print("400 are answered", flush=True)
     threading.Event().wait()
 
-rows.evaluate = first
+rows.answer_all = first
 """
 """What makes a sweep stop after 400 points, and stay until it is killed."""
 
@@ -222,9 +222,9 @@ def test_a_sweep_that_is_killed_goes_on_and_no_point_is_asked_twice(tmp_path, ca
     def counting(questions, **options):
         questions = list(questions)
         asked.extend(questions)
-        return evaluate(questions, **options)
+        return answer_all(questions, **options)
 
-    monkeypatch.setattr("service.sweeping.rows.evaluate", counting)
+    monkeypatch.setattr("service.sweeping.rows.answer_all", counting)
     again = ["sweep", "wall-300", *WIDE, "-o", str(folder), "--json", "--resume"]
     assert run_command_line(again) == DONE
     assert len(asked) == 1200 - done

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from planner import Climb, RouteResult, evaluate, plan_climb
 from service.answering import route_of
 from service.commands.stances import read_route
-from service.requests import Pose, RouteRequest
+from service.requests import PoseMessage, RouteRequest
 
 
 class Climbed(NamedTuple):
@@ -50,7 +50,7 @@ def _raised(route: RouteRequest, limb: str, by: float) -> Any:
     )
 
 
-def _along(pose: Pose, by: float) -> Pose:
+def _along(pose: PoseMessage, by: float) -> PoseMessage:
     """Return a pose that is moved up the slab [m]."""
     up = np.array([0.155291, 0.0, 0.579555]) / np.hypot(0.155291, 0.579555)
     x, y, z = (np.array(pose.position) + by * up).tolist()
