@@ -227,13 +227,6 @@ class HandBatch:
         tiles = tuple([hand.tiles for hand in hands])
         positions = [hand.positions for hand in hands]
         angles = concatenated([hand.postures.angles for hand in hands])
-        # what touches nothing uses nothing
-        limits = [
-            (hand.palm.shear_limit, hand.palm.pressing_limit)
-            if hand.palm.engaged
-            else (math.inf, math.inf)
-            for hand in hands
-        ]
         points = np.concatenate([*positions, [hand.palm.centre for hand in hands]])
         axes = concatenated([hand.axes for hand in hands])
         engagement = concatenated([hand.engagement for hand in hands])
@@ -253,7 +246,30 @@ class HandBatch:
             concatenated([hand.lateral_shares for hand in hands]),
             angles,
             bends,
-            np.array(limits),
+            _palm_limits(hands),
+        )
+
+    def after_slips(self, hands: Sequence[SettledHand]) -> HandBatch:
+        """Return the same hands after tiles have slipped: no hand, and no finger, has moved.
+
+        Parameters
+        ----------
+        hands : sequence of SettledHand
+            As of `hand_models.fixed_wrist.slipped_hand`, or as they were.
+        """
+        engagement = concatenated([hand.engagement for hand in hands])
+        engagement.setflags(write=False)
+        return HandBatch(
+            tuple(hands),
+            self.places,
+            contact_pattern_of(tuple([hand.tiles for hand in hands])),
+            self.points,
+            self.axes,
+            engagement,
+            concatenated([hand.lateral_shares for hand in hands]),
+            self.angles,
+            self.bends,
+            _palm_limits(hands),
         )
 
     @property
@@ -276,6 +292,17 @@ class HandBatch:
     def bearing_shares(self) -> Array:
         """Share of what balances its joint that each contact bears, shape (F, 3)."""
         return concatenated([hand.postures.bearing_shares for hand in self.hands])
+
+
+def _palm_limits(hands: Sequence[SettledHand]) -> Array:
+    """Return the limits of palms' shear and pressing; what touches nothing uses nothing."""
+    limits = [
+        (hand.palm.shear_limit, hand.palm.pressing_limit)
+        if hand.palm.engaged
+        else (math.inf, math.inf)
+        for hand in hands
+    ]
+    return np.array(limits)
 
 
 def concatenated(parts: Sequence[NDArray[Number]]) -> NDArray[Number]:

@@ -20,13 +20,13 @@ from hand_models.base import Array, BoundedStore, InvalidInputError, Unsupported
 from hand_models.fixed_wrist import slipped_hand, wrench_spaces
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.wrench_spaces import WrenchSpace
-from planner.prepare import HandBatch, PreparedStance
+from planner.prepare import PreparedStance
 from planner.programs import Columns, ScaledRows, StanceData
 from planner.question import LostTile
 from planner.recovery.spare_fingers import cannot_spare
 from planner.recovery.superposition import superposed
 from planner.result import Plan
-from planner.solving import Checks, FixedSolution, StanceAnswer, Verified, answer_on, idle_joints
+from planner.solving import Checks, FixedSolution, StanceAnswer, Verified, answer_on
 
 __all__ = ["Recovered", "Recovery"]
 
@@ -121,7 +121,7 @@ class Recovery:
     def __init__(self, prepared: PreparedStance, *, many: bool = False) -> None:
         _refuse(prepared)
         self.prepared = prepared
-        self._many, self._idle = many, idle_joints(prepared)
+        self._many, self._checks = many, Checks.of(prepared)
         data = prepared.hands.data
         self._places = {
             (limb, tile.finger, tile.phalanx): (h, t)
@@ -228,7 +228,7 @@ class Recovery:
     ) -> Recovered:
         keys = self._keys(by_hand, released, off)
         prepared = self._stance_without(keys, body_wrench)
-        checks = Checks.of(prepared, self._idle, lost)
+        checks = self._checks.after_slips(prepared, lost)
         found = answer_on(prepared, start, checks, self._nearest(keys), prove=not self._many)
         solution = found.answer.solution
         if isinstance(found.answer, Verified) and isinstance(solution, FixedSolution):
@@ -294,7 +294,9 @@ class Recovery:
             hands[h], spaces[h], scaled[h] = each
         sets = prepared.hands.with_sets(spaces, scaled=tuple(scaled))
         data = replace(sets.data, rows=sets.data.rows._replace(columns=self._columns(sets.data)))
-        return replace(prepared, batch=HandBatch.of(hands), hands=replace(sets, data=data))
+        return replace(
+            prepared, batch=prepared.batch.after_slips(hands), hands=replace(sets, data=data)
+        )
 
     def _columns(self, data: StanceData) -> Columns:
         """Return the rows as the solver takes them, in the pattern that it has already."""

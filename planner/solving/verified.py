@@ -76,7 +76,6 @@ class Checks(NamedTuple):
         cls,
         prepared: PreparedStance,
         idle: Sequence[LimitUse] | None = None,
-        lost: Sequence[LostTile] = (),
     ) -> Checks:
         """Return recovery and checks of the loads of a stance, without findings.
 
@@ -86,13 +85,25 @@ class Checks(NamedTuple):
             The question's stance, with hands on their holds and their sets.
         idle : sequence of LimitUse, optional
             Utilisation of the joints of limbs without a hand; computed by default.
-        lost : sequence of LostTile, optional
-            The tiles that have slipped; none by default.
         """
         batch, hands = prepared.batch, prepared.hands
         fixed = None if hands.floating else LoadRecovery(batch, hands.spaces, hands.scaled)
         used = idle_joints(prepared) if idle is None else tuple(idle)
-        return cls(Check(prepared.question, batch, prepared.where, lost), fixed, used)
+        return cls(Check(prepared.question, batch, prepared.where), fixed, used)
+
+    def after_slips(self, prepared: PreparedStance, lost: Sequence[LostTile]) -> Checks:
+        """Return recovery and checks of the same stance, whose wrists are fixed, after slips.
+
+        Parameters
+        ----------
+        prepared : PreparedStance
+            The stance with its hands after tiles have slipped.
+        lost : sequence of LostTile
+            The tiles that have slipped.
+        """
+        question, batch, hands = prepared.question, prepared.batch, prepared.hands
+        check = Check(question, batch, prepared.where, lost, self.check)
+        return Checks(check, LoadRecovery(batch, hands.spaces, hands.scaled), self.idle)
 
 
 def prepare_checks(prepared: PreparedStance) -> Checks:

@@ -22,7 +22,7 @@ import numpy as np
 
 from hand_models.base import SKEW_MATRICES, Array, BoundedStore
 from planner.prepare import HandBatch, Posture
-from planner.question import HandOnHold, LostTile, Question
+from planner.question import HandOnHold, LostTile, Question, Stance
 from planner.result import PlanArrays
 from planner.verification.fingers import DriveLimits, NailLimits, TwistLimits
 from planner.verification.floating import recompute_floating
@@ -58,6 +58,8 @@ class SettledLimits:
         motors of a floating hand have tightened its tendons [N]; by default the closing tension.
     strength : float
         Largest tension of every tendon [N].
+    before : SettledLimits, optional
+        Limits of the same hands before tiles slipped, from which what stays is taken over.
 
     Attributes
     ----------
@@ -73,7 +75,15 @@ class SettledLimits:
         All limits but those of nails.
     """
 
-    def __init__(self, known: HandBatch, places: Sequence[HandOnHold], strength: float) -> None:
+    def __init__(
+        self,
+        known: HandBatch,
+        places: Sequence[HandOnHold],
+        strength: float,
+        before: SettledLimits | None = None,
+    ) -> None:
+        self._balance: JointBalance
+        self._twists: TwistLimits
         self.names = names = PartNames(tuple([place.limb for place in places]), known)
         self.wound = {
             h: known.hands[h].closing_tension
@@ -83,11 +93,13 @@ class SettledLimits:
             if place.wrist == "floating"
         }
         giving = [h for h, place in enumerate(places) if place.wrist != "fixed"]
-        self._balance = balance = JointBalance(names, giving)
+        whole = None if before is None else before._balance
+        self._balance = balance = JointBalance(names, giving, whole)
         self.nails = nails = NailLimits(names)
         drives = DriveLimits(names, balance.left, strength, nails.fingers)
         self.tiles = tiles = TileLimits(names, nails.tiles)
-        self.limits = (balance, tiles, drives, TwistLimits(known), HandLimits(names))
+        self._twists = TwistLimits(known) if before is None else before._twists
+        self.limits = (balance, tiles, drives, self._twists, HandLimits(names))
 
     def recompute(self, found: list[str], arrays: PlanArrays) -> Recomputed:
         """Recompute the tile loads from a plan's tensions, or for floating wrists from their poses.
@@ -121,13 +133,16 @@ SETTLED_LIMITS: Final[BoundedStore[Hashable, SettledLimits]] = BoundedStore(
 
 
 def _settled_limits(
-    known: HandBatch, places: Sequence[HandOnHold], strength: float
+    known: HandBatch,
+    places: Sequence[HandOnHold],
+    strength: float,
+    before: SettledLimits | None,
 ) -> SettledLimits:
     preloads = [place.tendon_preload for place in places]
     wound = tuple([None if preload is None else preload.tobytes() for preload in preloads])
     names = tuple([(place.limb, place.wrist) for place in places])
     key = known.hands, names, wound, strength
-    return SETTLED_LIMITS.get(key, lambda: SettledLimits(known, places, strength))
+    return SETTLED_LIMITS.get(key, lambda: SettledLimits(known, places, strength, before))
 
 
 class Check:
@@ -143,6 +158,9 @@ class Check:
         Joint angles and joint loads; None if the question has no joints.
     lost : sequence of LostTile, optional
         The tiles that have slipped; none by default.
+    before : Check, optional
+        The check of the same stance before tiles slipped, from which all that stays is taken over:
+        where hands and fingers are.
 
     Attributes
     ----------
@@ -165,27 +183,30 @@ class Check:
         known: HandBatch,
         where: Posture | None = None,
         lost: Sequence[LostTile] = (),
+        before: Check | None = None,
     ) -> None:
+        self.settled: SettledLimits
+        self.carry: Array
         hands, stance, limits = known.hands, question.stance, question.limits
         self.question, self.where, self.known = question, where, known
         cap, most = limits.tendon_tension, hands[0].hand.maximum_tension
         self.strength = most if cap is None else min(most, cap)
-        self.settled = _settled_limits(known, stance.hands, self.strength)
+        same = before is None or all(
+            now.as_closed is then for now, then in zip(hands, before.known.hands, strict=True)
+        )
+        if not same or (before is not None and before.question.stance is not stance):
+            raise ValueError("the check before tiles slipped is of another stance")
+        whole = None if before is None else before.settled
+        self.settled = _settled_limits(known, stance.hands, self.strength, whole)
         self.limbs = self.settled.names.limbs
         asked = AskedLimits(question, self.settled.names, self.settled.tiles)
         self._limits: tuple[ResidualLimits, ...] = (*self.settled.limits, asked)
         self._slipped: SlippedTiles | None = None
         if lost or not all(hand.closed is None for hand in hands):
-            self._slipped = SlippedTiles(self.settled.names, lost)
+            closed = None if before is None else before.known.touch.contacts
+            self._slipped = SlippedTiles(self.settled.names, lost, closed)
             self._limits += (self._slipped,)
-        poses = [place.pose for place in stance.hands]
-        into_body = stance.body.rotation.T
-        turns = into_body @ np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)
-        levers = (np.array([pose.position for pose in poses]) - stance.body.position) @ into_body.T
-        carry = np.zeros((len(poses), 6, 6))
-        carry[:, :3, :3] = carry[:, 3:, 3:] = turns
-        carry[:, 3:, :3] = (levers @ SKEW_MATRICES.reshape(3, 9)).reshape(-1, 3, 3) @ turns
-        self.carry = -carry.transpose(1, 0, 2).reshape(6, -1)
+        self.carry = _carry(stance) if before is None else before.carry
 
     def problems(
         self,
@@ -338,3 +359,15 @@ class Check:
                 off = np.abs(stiffness * (target - wrist.twist) - wrench).max()
             if not off <= 1e-9 * max(1.0, np.abs(wrench).max()):  # by rounding
                 yield f"{place.limb}: a limb that aims at its pose target exerts another wrench"
+
+
+def _carry(stance: Stance) -> Array:
+    """Return the map from the hands' wrenches to the rock's reaction, `Check.carry`."""
+    poses = [place.pose for place in stance.hands]
+    into_body = stance.body.rotation.T
+    turns = into_body @ np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)
+    levers = (np.array([pose.position for pose in poses]) - stance.body.position) @ into_body.T
+    carry = np.zeros((len(poses), 6, 6))
+    carry[:, :3, :3] = carry[:, 3:, 3:] = turns
+    carry[:, 3:, :3] = (levers @ SKEW_MATRICES.reshape(3, 9)).reshape(-1, 3, 3) @ turns
+    return np.asarray(-carry.transpose(1, 0, 2).reshape(6, -1))

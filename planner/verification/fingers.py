@@ -14,7 +14,7 @@ from hand_models.base import BASE_TOLERANCES, Array, Indices
 from hand_models.hand import FINGERS, NAIL
 from planner.prepare import CONTACT_CODES, HandBatch
 from planner.result import PlanArrays
-from planner.verification.joint_balance import frame_axes, wrenches_of
+from planner.verification.finger_geometry import frame_axes, wrenches_of
 from planner.verification.residuals import (
     FINGER_COUNT,
     PartNames,

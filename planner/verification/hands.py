@@ -10,7 +10,7 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.hand import HELD_DIRECTIONS
 from planner.result import PlanArrays
-from planner.verification.joint_balance import wrenches_of
+from planner.verification.finger_geometry import wrenches_of
 from planner.verification.residuals import (
     TOLERANCES,
     PartNames,

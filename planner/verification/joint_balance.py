@@ -11,27 +11,25 @@ M_i the share of the tension that is left at joint i or tile t, r_i the pulley r
 stiffness and preload of the spring, g and e_t gains of shear, f_c the closing tension at which the
 spines engaged, and φ_t the share of the spines that did.
 
-Moments are taken about the joints' axes in H. Each axis is a row (a × p, −a) that is multiplied by
-a wrench (F, M) about the origin of H: with a across the finger, a × p = a × p_0 − x e_z + z e_x for
-a joint at (x, z) of the finger's plane. Nothing is shared with the computation of the affine maps
-of settled hands (Eq. 14): the balance itself is solved, once for hands at rest, whose loads are
-affine in the tensions. A tile that has slipped has the shear μ N of friction, N its normal load.
-A contact of few spines across a gap bears the share w of what balances its joint, and the joint,
-which is taken as locked, the rest (`hand_models.finger.Contact`).
+Nothing is shared with the computation of the affine maps of settled hands (Eq. 14): the balance
+itself is solved, once for hands at rest, whose loads are affine in the tensions. A tile that has
+slipped has the shear μ N of friction, N its normal load. A contact of few spines across a gap bears
+the share w of what balances its joint, and the joint, which is taken as locked, the rest
+(`hand_models.finger.Contact`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import SKEW_MATRICES, Array, Indices
-from hand_models.finger import JOINT_STOPS, PHALANGES
-from hand_models.hand import HandModel
-from planner.prepare import CONTACT_CODES, HandBatch, TileIndex
+from hand_models.base import Array, Indices
+from hand_models.finger import JOINT_STOPS
+from planner.prepare import CONTACT_CODES
+from planner.verification.finger_geometry import RestingFingers, moments_of
 from planner.verification.residuals import (
     FINGER_COUNT,
     PartNames,
@@ -40,70 +38,7 @@ from planner.verification.residuals import (
     ResidualLimits,
 )
 
-__all__ = ["Fingers", "JointBalance", "frame_axes", "tendons_of", "wrenches_of"]
-
-TURNED_PHALANGES: Final = np.tri(len(PHALANGES)).T
-"""Ones where a joint (row) turns a phalanx (column)."""
-
-CROSS_PRODUCT: Final = SKEW_MATRICES.transpose(0, 2, 1).reshape(9, 3)
-"""The map of p ⊗ F to the moment p × F."""
-
-
-def wrenches_of(points: Array, forces: Array) -> Array:
-    """Return the wrenches about the origin of forces at points, shape (n, 6) [N, N·m].
-
-    Parameters
-    ----------
-    points, forces : ndarray, shape (n, 3)
-        Points [m] and the forces that act there [N], in one frame.
-    """
-    moments = (points[:, :, None] * forces[:, None]).reshape(-1, len(CROSS_PRODUCT)) @ CROSS_PRODUCT
-    return np.concatenate((forces, moments), axis=1)
-
-
-def tendons_of(places: TileIndex, hand: HandModel) -> tuple[Array, Array, Array, Array]:
-    """Return the coefficients of tendons on joints and tiles, for hands of one model.
-
-    The T tiles and F fingers are counted through all hands; all tiles are taken to touch.
-
-    Parameters
-    ----------
-    places : TileIndex
-        Index of the tiles of all hands.
-    hand : HandModel
-        Model of all the hands.
-
-    Returns
-    -------
-    pull : ndarray, shape (F, 3)
-        Torque of each joint per newton of tension, M r [m].
-    left : ndarray, shape (T,)
-        Share of the tension that is left at each tile after friction; of nails zero.
-    gain : ndarray, shape (T,)
-        Shear of each tile per newton of tension; of nails zero.
-    engaged : ndarray, shape (T,)
-        Shear of each tile at zero tension per newton of closing tension; of nails zero.
-    """
-    model = hand.finger
-    loss = 1.0 - model.friction
-    # what is left of the tension at each phalanx's tile; a base tile comes first
-    local: Array = np.full((len(places.phalanges), len(PHALANGES)), loss) ** np.arange(
-        len(PHALANGES)
-    )
-    local[places.base_fingers] *= loss
-    left, gain, engaged = np.zeros((3, len(places.hand)))
-    left[places.phalanges], left[places.bases] = local, 1.0
-    gain[places.phalanges] = local * model.shear_gain
-    gain[places.bases] = model.shear_gain[0]
-    engaged[places.phalanges] = local * np.array(model.engagement)
-    engaged[places.bases] = model.base_engagement
-    return local * model.pulley_radii, left, gain, engaged - gain
-
-
-def frame_axes(known: HandBatch) -> Array:
-    """Return along, inward and the place of the proximal joint of each finger, (F, 3, 3), in H."""
-    turns = tuple([hand.grasp.outer_rotation for hand in known.hands])
-    return known.hands[0].hand.frame_stack(turns).planes.reshape(-1, 3, 3)
+__all__ = ["Fingers", "JointBalance"]
 
 
 class Fingers(NamedTuple):
@@ -140,6 +75,8 @@ class JointBalance(ResidualLimits):
         Names of the hands' parts.
     floating : collection of int
         Indices of the hands with floating or compliant wrists, whose tendons may be slackened.
+    before : JointBalance, optional
+        The balance of the same hands before tiles slipped, whose geometry is taken over.
 
     Attributes
     ----------
@@ -152,31 +89,25 @@ class JointBalance(ResidualLimits):
         Finger and joint of each joint at a stop, for fingers that touch rock.
     """
 
-    def __init__(self, names: PartNames, floating: Collection[int] = ()) -> None:
+    def __init__(
+        self,
+        names: PartNames,
+        floating: Collection[int] = (),
+        before: JointBalance | None = None,
+    ) -> None:
         known = names.known
         hands, places, touch = known.hands, known.places, known.touch
         self._names, self._known, body = names, known, hands[0].hand
+        self._resting: RestingFingers
+        self._resting = at_rest = RestingFingers.of(known) if before is None else before._resting
+        self.left = at_rest.left
         # slipped tiles drag on with friction alone
         self._rubs = np.zeros(len(places.hand))
         self._rubs[touch.slipped] = known.friction[touch.slipped]
         self._rubs[places.bases] = 0.0  # which no joint presses
-        self._pull, self.left, gain, engaged = tendons_of(places, body)
         self._closing = np.array(known.closing_tensions)
-        self._shear = engaged * self._closing.take(places.hand) * known.engagement
-        self._gain = gain * known.engagement
-        self._rest = known.bends * -np.array(body.finger.joint_stiffness)
-        self._rest -= body.finger.joint_preload
-        along, _, joints = frame_axes(known).swapaxes(0, 1)
-        across = along[:, [1, 0, 2]] * [-1.0, 1.0, 0.0]
-        # the proximal joints' axes as rows for wrenches; what is added per metre along and inward
-        self._first_axes = wrenches_of(joints, -across)[:, None, [3, 4, 5, 0, 1, 2]]
-        self._turns = np.zeros((len(along), 2, 6))
-        self._turns[:, 0, 2], self._turns[:, 1, :3] = -1.0, along
-        directions = np.empty((*known.angles.shape, 2))
-        np.cos(known.angles, out=directions[..., 0])
-        np.sin(known.angles, out=directions[..., 1])
-        # ones where a phalanx (column) is before a joint (row)
-        self._joints = body.finger.joint_spacing * np.tri(len(PHALANGES), k=-1) @ directions
+        self._shear = at_rest.engaged * known.engagement
+        self._gain = at_rest.gain * known.engagement
         # friction holds the tendon of a finger that draws a tile or a nail along rock
         drawing = [
             i
@@ -203,13 +134,14 @@ class JointBalance(ResidualLimits):
         self._few = self._shared_joints()
 
         # two tensions suffice, as shears, normals and balances are affine in them
-        ends = self.fingers(np.repeat([[0.0], [1.0]], len(self._pull), axis=1))
+        shear = np.stack((self._shear, self._shear + self._gain))
+        torques = np.stack((at_rest.springs, at_rest.springs + at_rest.pull))
         try:
-            normals, left = self.solved(ends)
+            normals, left = self._balanced(shear, torques, at_rest.moments)
         except np.linalg.LinAlgError:
             # nothing is what it should be, so that every plan is refused
-            normals, left = np.full(ends.shear.shape, np.nan), np.full(ends.torques.shape, np.nan)
-        both = np.stack((ends.shear + self._rubs * normals, normals), axis=2)
+            normals, left = np.full(shear.shape, np.nan), np.full(torques.shape, np.nan)
+        both = np.stack((shear + self._rubs * normals, normals), axis=2)
         self._at_zero, self._per_newton = np.zeros((2, normals.shape[1], 3))
         self._at_zero[:, :2], self._per_newton[:, :2] = both[0], both[1] - both[0]
         self._left_at_zero, self._left_per_newton = left[0], left[1] - left[0]
@@ -309,12 +241,15 @@ class JointBalance(ResidualLimits):
         numpy.linalg.LinAlgError
             If the contacts cannot balance the free joints.
         """
-        phalanges, points = self._known.places.phalanges, fingers.points[: len(fingers.axes)]
-        along = wrenches_of(points, fingers.axes[:, 0])[phalanges]
-        into = wrenches_of(points, fingers.axes[:, 1] + self._rubs[:, None] * fingers.axes[:, 0])
-        rows = self._axes_of(fingers.joints)
-        left = fingers.torques - _turned(rows, along * fingers.shear[..., phalanges, None])
-        turns = rows @ into[phalanges].transpose(0, 2, 1) * TURNED_PHALANGES
+        rows, phalanges = self._axes_of(fingers.joints), self._known.places.phalanges
+        moments = moments_of(rows, fingers.points, fingers.axes, phalanges)
+        return self._balanced(fingers.shear, fingers.torques, moments)
+
+    def _balanced(self, shear: Array, torques: Array, moments: Array) -> tuple[Array, Array]:
+        """Return normal loads and what is left, as `solved`, by moments (2, F, 3, 3) of loads."""
+        phalanges = self._known.places.phalanges
+        left = torques - (moments[0] @ shear[..., phalanges, None])[..., 0]
+        turns = moments[1] + moments[0] * self._rubs[phalanges][:, None]
         A, b = turns.copy(), left.copy()
         if self.held is not None:
             which, held = self.held.nonzero()
@@ -331,22 +266,17 @@ class JointBalance(ResidualLimits):
             A[self._few] += (1.0 - share) * own
             b[..., few, joint] *= share
         normals = np.linalg.solve(A, b[..., None])
-        normal = np.zeros(fingers.shear.shape)
+        normal = np.zeros(shear.shape)
         normal[..., phalanges] = normals[..., 0]
         return normal, left - (turns @ normals)[..., 0]
 
     def fingers(self, tensions: Array) -> Fingers:
         """Return the state of the fingers at rest for tendon tensions, shape (…, F) [N]."""
-        known = self._known
+        known, at_rest = self._known, self._resting
         shear = self._shear + self._gain * tensions[..., known.places.finger]
-        torques = self._pull * tensions[..., None] + self._rest
-        return Fingers(shear, torques, self._joints, known.points, known.axes)
+        torques = at_rest.pull * tensions[..., None] + at_rest.springs
+        return Fingers(shear, torques, at_rest.joints, known.points, known.axes)
 
     def _axes_of(self, joints: Array) -> Array:
         """Return the joints' axes where these are, as rows for wrenches, shape (F, 3, 6)."""
-        return np.asarray(joints @ self._turns + self._first_axes)
-
-
-def _turned(axes: Array, wrenches: Array) -> Array:
-    """Return what wrenches of each finger's phalanges turn its joints with, shape (…, F, 3)."""
-    return np.asarray(np.add.reduce(axes * (TURNED_PHALANGES @ wrenches), axis=-1))
+        return np.asarray(joints @ self._resting.turns + self._resting.axes)

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from hand_models.base import Indices
 from planner.prepare import CONTACT_CODES, contact_pattern_of
 from planner.question import LostTile
 from planner.verification.residuals import PartNames, Recomputed, Residual, ResidualLimits
@@ -27,9 +28,17 @@ class SlippedTiles(ResidualLimits):
         Names of the hands' parts.
     lost : sequence of LostTile
         The tiles that have slipped.
+    closed : ndarray of int, shape (T,), optional
+        Contact state of each tile before any slipped, as code of `CONTACT_CODES`; by default those
+        of the hands as they closed.
     """
 
-    def __init__(self, names: PartNames, lost: Sequence[LostTile]) -> None:
+    def __init__(
+        self,
+        names: PartNames,
+        lost: Sequence[LostTile],
+        closed: Indices | None = None,
+    ) -> None:
         self._names, known = names, names.known
         gone = {(tile.limb, tile.finger, tile.phalanx) for tile in lost}
         pairs = zip(names.limbs, known.hands, strict=True)
@@ -38,6 +47,10 @@ class SlippedTiles(ResidualLimits):
         self._tiles = np.array(tiles, dtype=np.intp)
         self._found = len(tiles) == len({*lost})
         self._friction = known.friction[self._tiles]
+        if closed is None:
+            as_closed = tuple([hand.as_closed.tiles for hand in known.hands])
+            closed = contact_pattern_of(as_closed).contacts
+        self._closed = closed
 
     def recompute(self, again: Recomputed) -> list[Residual]:
         """Return the residuals of friction of the tiles that have slipped, which only presses."""
@@ -60,10 +73,9 @@ class SlippedTiles(ResidualLimits):
             yield "a tile that is said to have slipped is not in this stance"
         known = self._names.known
         now = known.touch.contacts
-        closed = contact_pattern_of(tuple([hand.as_closed.tiles for hand in known.hands])).contacts
         off = now == CONTACT_CODES["none"]
         whole = np.logical_and.reduceat(off, known.places.first_of_finger)[known.places.finger]
-        wrong = now != closed
+        wrong = now != self._closed
         wrong[self._tiles] = now[self._tiles] != CONTACT_CODES["slipped"]
         for t in np.flatnonzero(wrong & ~(off & whole)).tolist():
             yield f"{self._names.tile(t)} has another contact than its slip leaves it"

@@ -9,13 +9,14 @@ from scipy.optimize import linprog
 from hand_models.base import InvalidInputError, UnsupportedError
 from hand_models.fixed_wrist import slipped_hand
 from hand_models.hand import FINGERS
-from planner.prepare import prepare_stance
+from planner.prepare import HandBatch, prepare_stance
 from planner.programs.conic import WAITING_SOLVERS
 from planner.programs.program import Best
 from planner.question import LostTile
 from planner.recovery import Recovery
 from planner.recovery.spare_fingers import cannot_spare
 from planner.verification import Check
+from planner.verification.check import SETTLED_LIMITS
 from service.answering.questions import question
 from service.commands.stances import read_request
 from tests.suite.helpers.hands import pinch
@@ -217,6 +218,39 @@ def test_the_check_refuses_what_a_slip_leaves_nobody(recoveries):
     loads[dragging, :2] *= -1.0
     wrong = check.problems(arrays._replace(loads=loads), without.utilisation, prepared.wrench)
     assert any("cannot pull" in each for each in wrong)
+
+
+def test_a_check_that_takes_over_what_stays_is_the_same(recoveries):
+    """Residuals of noisy numbers are those of a check that is prepared from the hands alone."""
+    noise = np.random.default_rng(0)
+    for name, recovery in recoveries.items():
+        prepared = recovery.prepared
+        whole = Check(prepared.question, prepared.batch, prepared.where)
+        for count in (1, 3):
+            lost = [recovery.tiles[t] for t in noise.choice(len(recovery.tiles), count, False)]
+            found = recovery.plan(lost)
+            after, arrays = found.found.prepared, found.verified.arrays
+            bare = HandBatch.of(after.batch.hands)
+            arrays = arrays._replace(loads=arrays.loads + noise.normal(size=arrays.loads.shape))
+            # each of the two works its limits out
+            SETTLED_LIMITS.clear()
+            checks = [Check(after.question, after.batch, after.where, lost, whole)]
+            SETTLED_LIMITS.clear()
+            checks.append(Check(after.question, bare, after.where, lost))
+            joints = checks[0].joints([], arrays.wrenches, after.wrench)
+            (taken, _, used), (own, _, alone) = (c.recompute([], arrays, joints) for c in checks)
+            assert used == pytest.approx(alone, abs=1e-9), name
+            assert np.abs(checks[0].carry - checks[1].carry).max() == 0.0
+            for each, other in zip(taken, own, strict=True):
+                assert each.values == pytest.approx(other.values, abs=1e-9), (name, each.text)
+    with pytest.raises(ValueError, match="another stance"):
+        Check(after.question, after.batch, after.where, lost, other_check(recoveries))
+
+
+def other_check(recoveries):
+    """Return the check of a stance of other hands."""
+    prepared = recoveries["slab"].prepared
+    return Check(prepared.question, prepared.batch, prepared.where)
 
 
 def test_the_hand_to_save_first_is_where_strength_helps_most(recoveries):
