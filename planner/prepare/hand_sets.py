@@ -7,12 +7,13 @@ exact at that point. The set of a hand with a fixed wrist does not depend on the
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from hand_models.base import Array, InvalidInputError, UnsupportedError
 from hand_models.compliance import (
@@ -199,6 +200,22 @@ class HandSets:
         own = self.wrists if wrists is None else wrists
         of_all = self.transports, self.wrench, self.held, self.added
         return HandSets.of(spaces, own, *of_all, scaled)
+
+    def with_hands(
+        self,
+        found: Mapping[int, tuple[WrenchSpace, ScaledRows, HandData]],
+        kept: NDArray[np.bool_],
+    ) -> HandSets:
+        """Return the same stance with other sets of hands with fixed wrists, by their index.
+
+        Rows have the same names; ``kept`` is as of `HandRows`.
+        """
+        spaces, scaled, parts = list(self.spaces), list(self.scaled), list(self.data.hands)
+        for h, each in found.items():
+            spaces[h], scaled[h], parts[h] = each
+        data = StanceData.of(tuple(parts), self.wrench)
+        data = replace(data, rows=replace(data.rows, kept=kept))
+        return replace(self, spaces=tuple(spaces), scaled=tuple(scaled), data=data)
 
     def turned(self, wrench: Array) -> HandSets:
         """Return the same hands for another body wrench, shape (6,), in B [N, N·m]."""

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import accumulate, pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.compliance import WRIST_COLUMNS, pose_units
@@ -296,29 +297,30 @@ def hands_data(
     return tuple(found)
 
 
-class HandRows(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class HandRows:
     """Rows of all hands in all their scaled loads z (M,): balance G z, limits L z, hard rows H z.
 
     Attributes
     ----------
     whole : ndarray, shape (nb + Σ nl + Σ nh, M)
         G above L above H.
-    columns : Columns
-        ``whole`` as a sparse matrix.
     rest : ndarray, shape (Σ nl + Σ nh,)
         −l0 above h.
     limits : int
         Number of limit rows, Σ nl.
     unit, tie : ndarray, shape (M,)
         Units and tie-break weights, as in `HandData`.
+    kept : ndarray of bool, shape as ``whole``, or None
+        True where ``columns`` have an entry, also if it is zero.
     """
 
     whole: Array
-    columns: Columns
     rest: Array
     limits: int
     unit: Array
     tie: Array
+    kept: NDArray[np.bool_] | None = None
 
     @classmethod
     def of(cls, hands: Sequence[HandData], balance: int) -> HandRows:
@@ -329,14 +331,22 @@ class HandRows(NamedTuple):
         whole = np.zeros((balance + len(rest), len(unit)))
         left, limit, below = 0, balance, balance + limits
         for hand in hands:
-            right, end = left + len(hand.unit), below + len(hand.h)
-            next_limit = limit + len(hand.l0)
+            right, end, next_limit = (
+                left + len(hand.unit),
+                below + len(hand.h),
+                limit + len(hand.l0),
+            )
             whole[:balance, left:right] = hand.G
             whole[limit:next_limit, left:right] = hand.L
             whole[below:end, left:right] = hand.H
             left, limit, below = right, next_limit, end
         tie = np.concatenate([hand.tie for hand in hands])
-        return cls(whole, Columns.of(whole), rest, limits, unit, tie)
+        return cls(whole, rest, limits, unit, tie)
+
+    @cached_property
+    def columns(self) -> Columns:
+        """``whole`` as a sparse matrix."""
+        return Columns.of(self.whole, self.kept)
 
 
 @dataclass(frozen=True, eq=False)

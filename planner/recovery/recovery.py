@@ -11,6 +11,7 @@ import time
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from hand_models.fixed_wrist import slipped_hand, wrench_spaces
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import PreparedStance
-from planner.programs import Columns, ScaledRows, StanceData
+from planner.programs import HandData, ScaledRows, StanceData, hands_data
 from planner.question import LostTile
 from planner.recovery.spare_fingers import cannot_spare
 from planner.recovery.superposition import superposed
@@ -83,11 +84,12 @@ class Recovered(NamedTuple):
 
 
 class _Hand(NamedTuple):
-    """A hand without tiles, its set, and the scaled rows of the set."""
+    """A hand without tiles, its set, the scaled rows of the set, and its part of the programs."""
 
     settled: SettledHand
     space: WrenchSpace
     scaled: ScaledRows
+    part: HandData
 
 
 _HandKey = tuple[int, tuple[int, ...], tuple[int, ...], bool]
@@ -129,7 +131,7 @@ class Recovery:
             for t, (tile, on_rock) in enumerate(zip(hand.tiles, hand.touching, strict=True))
             if on_rock
         }
-        self._pattern = _pattern(data)
+        self._pattern, self._blocks = _pattern(data), _blocks(data)
         # each tile alone, and as many losses of several
         most = 1024 if many else 2 * len(self._places) + 16
         self._hands: BoundedStore[_HandKey, _Hand] = BoundedStore("hands without tiles", most)
@@ -271,13 +273,20 @@ class Recovery:
 
     def _keep(self, keys: Sequence[_HandKey]) -> None:
         """Find hands without tiles, all in one call."""
-        added, whole = self.prepared.hands.added, self.prepared.batch.hands
+        sets, whole = self.prepared.hands, self.prepared.batch.hands
         hands = [
             slipped_hand(whole[h], tiles, fingers, palm=palm) for h, tiles, fingers, palm in keys
         ]
         plain = wrench_spaces(hands, self.prepared.question.limits.tendon_tension)
-        spaces = [added[key[0]].on(space) for key, space in zip(keys, plain, strict=True)]
-        found = [_Hand(*each, ScaledRows.of(each[1])) for each in zip(hands, spaces, strict=True)]
+        at = [h for h, *_ in keys]
+        spaces = [sets.added[h].on(space) for h, space in zip(at, plain, strict=True)]
+        scaled = [ScaledRows.of(space) for space in spaces]
+        parts = hands_data(scaled, sets.transports[at], [sets.held[h] for h in at])
+        for h, part in zip(at, parts, strict=True):
+            limits, hard, loads = self._blocks[h]
+            self._pattern[limits, loads] |= part.L != 0.0
+            self._pattern[hard, loads] |= part.H != 0.0
+        found = map(_Hand, hands, spaces, scaled, parts)
         self._hands.keep(zip(keys, found, strict=True))
 
     def _prepared(self, keys: Sequence[_HandKey]) -> PreparedStance:
@@ -287,23 +296,13 @@ class Recovery:
         if new:
             self._keep(new)
             found = self._hands.find(keys)
-        hands, spaces = list(prepared.batch.hands), list(prepared.hands.spaces)
-        scaled = list(prepared.hands.scaled)
+        hands, others = list(prepared.batch.hands), {}
         for (h, *_), each in zip(keys, found, strict=True):
             assert each is not None
-            hands[h], spaces[h], scaled[h] = each
-        sets = prepared.hands.with_sets(spaces, scaled=tuple(scaled))
-        data = replace(sets.data, rows=sets.data.rows._replace(columns=self._columns(sets.data)))
-        return replace(
-            prepared, batch=prepared.batch.after_slips(hands), hands=replace(sets, data=data)
-        )
-
-    def _columns(self, data: StanceData) -> Columns:
-        """Return the rows as the solver takes them, in the pattern that it has already."""
-        whole = data.rows.whole
-        if ((whole != 0.0) & ~self._pattern).any():
-            self._pattern |= whole != 0.0
-        return Columns.of(whole, self._pattern)
+            hands[h], others[h] = each.settled, (each.space, each.scaled, each.part)
+        # the rows as the solver takes them are in the pattern that it has already
+        sets = prepared.hands.with_hands(others, self._pattern)
+        return replace(prepared, batch=prepared.batch.after_slips(hands), hands=sets)
 
 
 def _released(prepared: PreparedStance, h: int) -> Iterator[str]:
@@ -312,6 +311,16 @@ def _released(prepared: PreparedStance, h: int) -> Iterator[str]:
     bearing = {tile.finger for tile in hand.tiles if tile.contact != "none"}
     before = {tile.finger for tile in hand.as_closed.tiles if tile.contact != "none"}
     yield from (finger for finger in FINGERS if finger in before - bearing)
+
+
+def _blocks(data: StanceData) -> list[tuple[slice, slice, slice]]:
+    """Return which rows of all are each hand's limits and hard rows, and which are its loads."""
+    hands, balance = data.hands, len(data.wrench)
+    rows = [*(len(hand.l0) for hand in hands), *(len(hand.h) for hand in hands)]
+    of_rows = [slice(*ends) for ends in pairwise(accumulate(rows, initial=balance))]
+    loads = accumulate((len(hand.unit) for hand in hands), initial=0)
+    of_loads = [slice(*ends) for ends in pairwise(loads)]
+    return list(zip(of_rows[: len(hands)], of_rows[len(hands) :], of_loads, strict=True))
 
 
 def _pattern(data: StanceData) -> NDArray[np.bool_]:

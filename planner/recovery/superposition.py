@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from hand_models.base import Array
-from planner.programs import Outcome
+from planner.programs import Outcome, parted
 from planner.solving import LeastUtilisation
 
 __all__ = ["superposed"]
@@ -39,24 +38,30 @@ def superposed(whole: LeastUtilisation, others: Sequence[LeastUtilisation]) -> L
 
 def _added(first: Outcome, others: Sequence[Outcome]) -> Outcome:
     """Return an outcome with the differences of others from it added to it."""
-
-    def parts(name: str, least: float = -np.inf) -> tuple[Array, ...]:
-        each = zip(*(getattr(other, name) for other in (first, *others)), strict=True)
-        return tuple([np.maximum(_sum(own), least) for own in each])
-
-    balances = [each.balance_dual for each in (first, *others)]
-    known = [each for each in balances if each is not None]
-    return replace(
-        first,
-        value=float(_sum([each.value for each in (first, *others)])),
-        loads=parts("loads"),
-        limit_duals=parts("limit_duals", 0.0),
-        hard_duals=parts("hard_duals", 0.0),
-        balance_dual=_sum(known) if len(known) == len(balances) else None,
+    known = all(each.balance_dual is not None for each in (first, *others))
+    each = [_numbers(outcome, balance=known) for outcome in (first, *others)]
+    # the first plus the differences of the others from it
+    whole = np.add.reduce(each) - len(others) * each[0]
+    hands = len(first.loads)
+    sizes = [len(part) for part in (*first.loads, *first.limit_duals, *first.hard_duals)]
+    loads = sum(sizes[:hands])
+    np.maximum(whole[loads : sum(sizes)], 0.0, out=whole[loads : sum(sizes)])
+    *parts, rest = parted(whole, [*sizes, len(whole) - sum(sizes)])
+    return Outcome(
+        first.solved,
+        first.status,
+        first.iterations,
+        float(rest[0]),
+        tuple(parts[:hands]),
+        tuple(parts[hands : 2 * hands]),
+        tuple(parts[2 * hands :]),
+        rest[1:] if known else None,
     )
 
 
-def _sum(values: Sequence[Array] | Sequence[float]) -> Array:
-    """Return the first of some values plus the differences of the others from it."""
-    first, *others = map(np.asarray, values)
-    return np.asarray(first + sum(each - first for each in others))
+def _numbers(outcome: Outcome, *, balance: bool) -> Array:
+    """Return all numbers of an outcome: loads, multipliers of limits and hard rows, the rest."""
+    parts = [*outcome.loads, *outcome.limit_duals, *outcome.hard_duals, np.array([outcome.value])]
+    if balance and outcome.balance_dual is not None:
+        parts.append(outcome.balance_dual)
+    return np.concatenate(parts)
