@@ -34,6 +34,16 @@ from .robust import (
     feedback_price as feedback_price,
     sample_value as sample_value,
 )
+from .scaled_rows import (
+    JOINT_FORCE as JOINT_FORCE,
+    JOINT_TORQUE as JOINT_TORQUE,
+    LOAD_UNIT as LOAD_UNIT,
+    TWIST_UNIT as TWIST_UNIT,
+    WRENCH_UNIT as WRENCH_UNIT,
+    WRIST_RANGE as WRIST_RANGE,
+    ScaledRows as ScaledRows,
+    is_effort as is_effort,
+)
 from .set_points import (
     SET_POINT_SETTINGS as SET_POINT_SETTINGS,
     Kept as Kept,
@@ -65,17 +75,10 @@ from .solvers import (
     vertex as vertex,
 )
 from .stance_data import (
-    JOINT_FORCE as JOINT_FORCE,
-    JOINT_TORQUE as JOINT_TORQUE,
-    LOAD_UNIT as LOAD_UNIT,
-    TWIST_UNIT as TWIST_UNIT,
-    WRENCH_UNIT as WRENCH_UNIT,
-    WRIST_RANGE as WRIST_RANGE,
     HandData as HandData,
-    ScaledRows as ScaledRows,
     StanceData as StanceData,
+    blocks_of as blocks_of,
     hands_data as hands_data,
-    is_effort as is_effort,
     parted as parted,
 )
 from .supports import SilentHighs as SilentHighs, Support as Support

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import Array
-from planner.programs.stance_data import LOAD_UNIT, WRENCH_UNIT
+from planner.programs.scaled_rows import LOAD_UNIT, WRENCH_UNIT
 
 __all__ = ["LOAD_BOX", "load_box"]
 

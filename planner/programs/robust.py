@@ -22,7 +22,8 @@ from hand_models.base import Array, Indices
 from hand_models.parameters import bundled_table
 from planner.programs.conic import Columns, ConicProgram
 from planner.programs.program import Best, Residuals, tie_weight
-from planner.programs.stance_data import LOAD_UNIT, StanceData
+from planner.programs.scaled_rows import LOAD_UNIT
+from planner.programs.stance_data import StanceData
 from planner.programs.stance_program import (
     REFINED_SETTINGS,
     SHARP_SETTINGS,

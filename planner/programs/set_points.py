@@ -22,7 +22,8 @@ import numpy as np
 from hand_models.base import Array
 from planner.programs.conic import Outcome
 from planner.programs.program import Best, Residuals
-from planner.programs.stance_data import LOAD_UNIT, StanceData, parted
+from planner.programs.scaled_rows import LOAD_UNIT
+from planner.programs.stance_data import StanceData, parted
 from planner.programs.stance_program import Definition
 
 __all__ = ["SET_POINT_SETTINGS", "Kept", "LeastChange", "kept", "least_change"]

@@ -10,7 +10,7 @@ import numpy as np
 
 from hand_models.base import Array
 from hand_models.wrench_spaces import WrenchSpace
-from planner.programs.stance_data import ScaledRows
+from planner.programs.scaled_rows import ScaledRows
 
 __all__ = ["SilentHighs", "Support"]
 

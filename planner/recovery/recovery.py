@@ -11,7 +11,6 @@ import time
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +21,7 @@ from hand_models.fixed_wrist import slipped_hand, wrench_spaces
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import PreparedStance
-from planner.programs import HandData, ScaledRows, StanceData, hands_data
+from planner.programs import HandData, ScaledRows, StanceData, blocks_of, hands_data
 from planner.question import LostTile
 from planner.recovery.spare_fingers import cannot_spare
 from planner.recovery.superposition import superposed
@@ -131,7 +130,7 @@ class Recovery:
             for t, (tile, on_rock) in enumerate(zip(hand.tiles, hand.touching, strict=True))
             if on_rock
         }
-        self._pattern, self._blocks = _pattern(data), _blocks(data)
+        self._pattern, self._blocks = _pattern(data), blocks_of(data.hands, len(data.wrench))
         # each tile alone, and as many losses of several
         most = 1024 if many else 2 * len(self._places) + 16
         self._hands: BoundedStore[_HandKey, _Hand] = BoundedStore("hands without tiles", most)
@@ -313,16 +312,6 @@ def _released(prepared: PreparedStance, h: int) -> Iterator[str]:
     yield from (finger for finger in FINGERS if finger in before - bearing)
 
 
-def _blocks(data: StanceData) -> list[tuple[slice, slice, slice]]:
-    """Return which rows of all are each hand's limits and hard rows, and which are its loads."""
-    hands, balance = data.hands, len(data.wrench)
-    rows = [*(len(hand.l0) for hand in hands), *(len(hand.h) for hand in hands)]
-    of_rows = [slice(*ends) for ends in pairwise(accumulate(rows, initial=balance))]
-    loads = accumulate((len(hand.unit) for hand in hands), initial=0)
-    of_loads = [slice(*ends) for ends in pairwise(loads)]
-    return list(zip(of_rows[: len(hands)], of_rows[len(hands) :], of_loads, strict=True))
-
-
 def _pattern(data: StanceData) -> NDArray[np.bool_]:
     """Return where rows may have entries that are not zero, whichever tiles slip.
 
@@ -330,11 +319,9 @@ def _pattern(data: StanceData) -> NDArray[np.bool_]:
     """
     places, balance = np.asarray(data.rows.whole != 0.0), len(data.wrench)
     places[:balance] = True
-    left = 0
-    for hand in data.hands:
-        own = places[:, left : left + len(hand.unit)]
+    for _, _, loads in blocks_of(data.hands, balance):
+        own = places[:, loads]
         own[own.sum(axis=1) > 2] = True
-        left += len(hand.unit)
     return places
 
 
