@@ -1,6 +1,7 @@
 from .active_set import (
     TOLERANCES as TOLERANCES,
     ApartError as ApartError,
+    Mask as Mask,
     Optimum as Optimum,
     Point as Point,
     Rows as Rows,

@@ -15,7 +15,7 @@ tension, up to a maximum at which u is fixed.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +26,7 @@ from planner.programs import (
     TIE_WEIGHT,
     TOLERANCES,
     ApartError,
+    Mask,
     Optimum,
     Outcome,
     Point,
@@ -93,14 +94,14 @@ def least_utilisation(
     closing : sequence of float
         Closing tension of every hand [N].
     near : LeastUtilisation, optional
-        Result for the same hands at another body wrench. If the same rows are active at the
-        optimum, no solver is called.
+        Result for the same hands at another body wrench, or a guess after slips. If nearly the same
+        rows are active at the optimum, no solver is called.
     twice : bool, optional
         False to look for the exact plan at a smaller weight near the first solution, before the
         program is solved again.
     """
     if near is not None:
-        exact = active_set_optimum(data, near.outcome, rounds=1)
+        exact = active_set_optimum(data, near.outcome, near=True)
         if exact is not None and not _far_beyond(exact.outcome):
             return _meant(data, exact, cap, closing, near.meant)
     outcome, share = programs.unique(data), 1.0
@@ -150,7 +151,7 @@ class ActiveSetOptimum(NamedTuple):
 
 
 def active_set_optimum(
-    data: StanceData, near: Outcome, share: float = 1.0, rounds: int | None = None
+    data: StanceData, start: Outcome, share: float = 1.0, *, near: bool = False
 ) -> ActiveSetOptimum | None:
     """Compute the exact optimum of `programs.unique` by the active-set method.
 
@@ -158,13 +159,14 @@ def active_set_optimum(
     ----------
     data : StanceData
         Scaled rows of all hands, and the wrench that they must balance.
-    near : Outcome
-        Solved outcome of the same program, or of the same hands at another body wrench.
+    start : Outcome
+        Solved outcome of the same program, or of one near it.
     share : float, optional
         Factor on the weight of the program's second term, as in `programs.unique`.
-    rounds : int, optional
-        Largest number of sets of active rows that are tried; by default as many as take less time
-        than a new solve.
+    near : bool, optional
+        True if the start is an exact optimum of another program, of the same hands at another body
+        wrench or with other tiles: its multipliers say more than its slacks, and few sets of active
+        rows are tried.
 
     Returns
     -------
@@ -173,8 +175,7 @@ def active_set_optimum(
     """
     rows, weight = Rows.of(data), share * tie_weight(len(data.hands))
     Q = 2.0 * weight * data.rows.tie
-    start = _point(data, near)
-    found = _on_active_rows(rows, Q, start, _rounds(len(Q)) if rounds is None else rounds)
+    found = _on_active_rows(rows, Q, _point(data, start), _rounds(len(Q)), near=near)
     if found is None:
         return None
     # with exact multipliers the bound of `unique_bound` is the optimum but for second terms
@@ -258,18 +259,46 @@ def _nearby(
 
 
 def _on_active_rows(
-    rows: Rows, Q: Array, start: Point, rounds: int, weight: float = 1.0, *, fixed: bool = False
+    rows: Rows,
+    Q: Array,
+    start: Point,
+    rounds: int,
+    weight: float = 1.0,
+    *,
+    fixed: bool = False,
+    near: bool = False,
 ) -> Optimum | None:
-    """Return the optimum from the rows that are active where a solver ended; None if too far."""
-    room = rows.room(start.z, start.u)
-    for sure in (1e-6, 1.0):  # ratios of multiplier to slack; more rows first
-        active = start.multipliers > sure * room
-        active[: rows.equations] = True
+    """Return the optimum from rows that may be active, as a solver's end has it, or one near it.
+
+    None if the optimum is too far; ``near`` is as of `active_set_optimum`.
+    """
+    if near:
+        rounds = min(rounds, 4)  # with more, it is sooner solved anew
+    for active in _guesses(rows, start, near=near):
         try:
-            return optimum(rows, Q, start, active, rounds, weight, fixed=fixed)
+            found = optimum(rows, Q, start, active, rounds, weight, fixed=fixed)
         except ApartError:
             continue
+        if found is not None or not near:
+            return found
     return None
+
+
+def _guesses(rows: Rows, start: Point, *, near: bool) -> Iterator[Mask]:
+    """Yield sets of rows that may be active at the optimum, the likeliest first."""
+    room, multipliers = rows.room(start.z, start.u), start.multipliers
+    # least ratio of multiplier to slack, and least multiplier; more rows first
+    least = [(1e-6, -math.inf), (1.0, -math.inf)]
+    if near:
+        # a row that does not count may be violated, and one that counts may have some slack
+        least = [(1e-2, 1e-9), (0.0, 1e-9), (1.0, -math.inf)]
+    tried: list[Mask] = []
+    for ratio, multiplier in least:
+        active = (multipliers > ratio * room) & (multipliers > multiplier)
+        active[: rows.equations] = True
+        if not any(np.array_equal(active, other) for other in tried):
+            tried.append(active)
+            yield active
 
 
 def _point(data: StanceData, outcome: Outcome) -> Point:

@@ -9,6 +9,7 @@ from scipy.optimize import linprog
 from hand_models.base import InvalidInputError, UnsupportedError
 from hand_models.fixed_wrist import slipped_hand
 from hand_models.hand import FINGERS
+from planner import programs
 from planner.prepare import HandBatch, prepare_stance
 from planner.programs.conic import WAITING_SOLVERS
 from planner.programs.program import Best
@@ -305,6 +306,19 @@ def test_a_plan_does_not_depend_on_where_its_search_starts(recoveries, name):
         assert one.utilisation == pytest.approx(two.utilisation, abs=1e-5)
         tensions = [each.verified.arrays.tensions for each in (one, two)]
         assert tensions[0] == pytest.approx(tensions[1], abs=0.05)
+
+
+def test_several_losses_mostly_take_no_solver(recoveries, monkeypatch):
+    """Their plans begin at those without one tile each."""
+    recovery = recoveries["wall-300"]
+    recovery.plan(())
+    for tile in recovery.tiles:
+        recovery.plan([tile])
+    solved, unique = [], programs.unique
+    monkeypatch.setattr(programs, "unique", lambda *each: solved.append(each) or unique(*each))
+    for lost in some(recovery, 5, 60):
+        assert recovery.plan(lost).verified is not None
+    assert len(solved) <= 5
 
 
 @pytest.mark.parametrize("name", ["wall", "slab"])
