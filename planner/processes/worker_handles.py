@@ -6,6 +6,7 @@ end with the process that started them, and leave SIGINT to that process.
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import pickle
@@ -256,6 +257,8 @@ def _answer_each(pipes: list[Connection], memory: int | None, stays: bool) -> No
     except BaseException:
         traceback.print_exc()
         sys.exit(70)  # exit status of what cannot be made ready
+    # what is loaded stays: to look through it for garbage takes a quarter of a second
+    gc.freeze()
     _keep_to(memory)
     for pipe in pipes[1:]:
         threading.Thread(target=_lane, args=(answer, pipe), daemon=True).start()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import signal
@@ -136,6 +137,8 @@ def serve_command(
         tables.remark(f"listening on {where}; the workers start, which takes some seconds")
         with service:
             stop.waits_for()
+            # what is loaded stays: no question waits until it is looked through for garbage
+            gc.freeze()
             node = service.ros
             if as_json:
                 own_names = {} if node is None else {"ros2": (*node.services, *node.topics)}

@@ -164,6 +164,12 @@ def test_each_process_does_its_linear_algebra_on_one_thread(monkeypatch):
     assert variables[1] not in os.environ
 
 
+def test_what_a_process_has_loaded_is_not_looked_through_for_garbage():
+    """Nobody waits for that: of a planner it takes a quarter of a second."""
+    with Workers(workshop.looked_through, 1) as workers:
+        assert done(workers, [None]) == {0: False}
+
+
 def test_neither_side_waits_for_the_other_to_take_what_is_large():
     """More than a pipe takes: items go out while results come back."""
     items = [bytes([i, 0]) * 400_000 for i in range(24)]
