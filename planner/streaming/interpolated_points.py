@@ -26,7 +26,7 @@ from planner.result import Finding, SetPoints, SetPointSource
 from planner.streaming.answered_points import PointsAfterSlips
 from planner.streaming.interpolation import Interpolation
 from planner.streaming.prefetch import Mixture, Prefetch
-from planner.streaming.stream_stance import LoadEffects, StreamStance, SupportBound
+from planner.streaming.stream_stance import LoadEffects, Solved, StreamStance, SupportBound
 
 __all__ = ["InterpolatedPoints"]
 
@@ -46,6 +46,8 @@ class InterpolatedPoints:
         self._stance = StreamStance(question)
         self._following = Prefetch(self._stance, radius)
         self._proofs: list[SupportBound] = []
+        self._near: Solved | None = None
+        """The plan that was solved last."""
         self._last: Array | None = None
         """Body wrench of the last set-points."""
 
@@ -124,7 +126,7 @@ class InterpolatedPoints:
                 if points.verified:
                     return points
                 share = 0.0
-        solved = self._stance.solve(wrench)
+        solved = self._near = self._stance.solve(wrench, self._near)
         if solved is None:
             return self._without(wrench)
         if share > 0.0:

@@ -77,11 +77,12 @@ class Interpolation:
         """
         per = 1.0 / (radius * PER_RADIUS)
         steps = np.diag(1.0 / per)
-        loads, cuts, used = [], [], []
+        loads, cuts, used, first = [], [], [], None
         for aside in (np.zeros(6), *steps, *-steps):
-            solved = stance.solve(centre + aside)
+            solved = stance.solve(centre + aside, first)
             if solved is None:
                 return None
+            first = first or solved
             loads.append(solved.loads.ravel())
             used.append(solved.outcome.value)
             found = stance.affine_bound(centre + aside, solved)

@@ -26,7 +26,7 @@ from planner.programs import (
 )
 from planner.question import Question
 from planner.result import LoadRecovery, Plan, PlanArrays
-from planner.solving import KnownStance, least_utilisation
+from planner.solving import KnownStance, LeastUtilisation, least_utilisation
 from planner.streaming.affine_bounds import AffineBound, affine_bound
 from planner.verification import Check, LoadsCheck
 
@@ -44,11 +44,14 @@ class Solved(NamedTuple):
         Outcome of the program of least utilisation.
     bound : float
         Lower bound of the least utilisation.
+    start : LeastUtilisation or None
+        Result with which the search for the plan of a wrench near by begins; None without one.
     """
 
     loads: Array
     outcome: Outcome
     bound: float
+    start: LeastUtilisation | None = None
 
 
 class LoadEffects(NamedTuple):
@@ -148,13 +151,15 @@ class StreamStance:
         rows += self._rest
         return LoadEffects(rows[:, :6], float(np.maximum.reduce(rows[:, 6:], axis=None)))
 
-    def solve(self, body_wrench: Array) -> Solved | None:
+    def solve(self, body_wrench: Array, near: Solved | None = None) -> Solved | None:
         """Solve for the plan of a body wrench: a little above the least utilisation, less tension.
 
         Parameters
         ----------
         body_wrench : ndarray, shape (6,)
             Wrench that the rock must exert on the robot, in B [N, N·m].
+        near : Solved, optional
+            Plan of a body wrench near by: no solver is called if nearly the same rows are active.
 
         Returns
         -------
@@ -162,7 +167,8 @@ class StreamStance:
             None if the least utilisation is not proven.
         """
         data = self._data.turned(self._scaled(body_wrench))
-        found = least_utilisation(data, self.cap, self._closing)
+        start = None if near is None else near.start
+        found = least_utilisation(data, self.cap, self._closing, start)
         outcome, bound, meant = found.outcome, found.bound, found.meant
         if not found.proven:
             meant = None
@@ -174,7 +180,8 @@ class StreamStance:
                 return None
         if meant is None:
             meant = programs.less_tension(data, tension_trade(outcome.value, self.cap))
-        return Solved(self._stacked((meant if meant.solved else outcome).loads), outcome, bound)
+        loads = self._stacked((meant if meant.solved else outcome).loads)
+        return Solved(loads, outcome, bound, found if found.proven else None)
 
     def overload(self, body_wrench: Array) -> str | None:
         """Return which limit the plan of a body wrench exceeds most; None if it exceeds none.

@@ -12,6 +12,7 @@ from msgspec import structs
 
 from hand_models.base import InvalidInputError, UnsupportedError
 from hand_models.rock import Cylinder
+from planner import programs
 from planner.programs import used_effort
 from planner.question import Limits, Load, Question
 from planner.result import LoadRecovery, SetPoints
@@ -134,6 +135,25 @@ def test_at_the_centre_the_set_points_are_those_of_the_plan(stream):
     np.testing.assert_allclose(points.tensions, tensions, atol=1e-5)
     assert points.gap < 1e-9
     assert stream.limbs == tuple(hand.limb for hand in answer.hands)
+
+
+def test_plans_near_another_are_those_from_the_beginning_and_mostly_take_no_solver(monkeypatch):
+    stance, rng, solved = StreamStance(WALL), np.random.default_rng(3), []
+    unique = programs.unique
+    monkeypatch.setattr(programs, "unique", lambda *each: solved.append(each) or unique(*each))
+    near = stance.solve(WEIGHT)
+    assert len(solved) == 1
+    for _ in range(20):
+        wrench = within(rng, WEIGHT, 1.0)
+        found, taken = stance.solve(wrench, near), len(solved)
+        alone = stance.solve(wrench)
+        assert len(solved) == taken + 1
+        solved.pop()
+        assert found.outcome.value == pytest.approx(alone.outcome.value, abs=1e-6)
+        np.testing.assert_allclose(found.loads, alone.loads, atol=1e-5)
+        assert found.bound <= found.outcome.value + 1e-6
+        near = found
+    assert len(solved) - 1 <= 4
 
 
 def test_the_cap_decides_the_status():
