@@ -11,6 +11,7 @@ import time
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import PreparedStance
 from planner.programs import HandData, ScaledRows, StanceData, blocks_of, hands_data
 from planner.question import LostTile
+from planner.recovery.joined_hands import JoinedHands
 from planner.recovery.spare_fingers import cannot_spare
 from planner.recovery.superposition import superposed
 from planner.result import Plan
@@ -131,8 +133,10 @@ class Recovery:
             if on_rock
         }
         self._pattern, self._blocks = _pattern(data), blocks_of(data.hands, len(data.wrench))
-        # each tile alone, and as many losses of several
-        most = 1024 if many else 2 * len(self._places) + 16
+        pairs = zip(prepared.batch.hands, prepared.hands.spaces, strict=True)
+        self._joined = [JoinedHands(*each) for each in pairs]
+        # each tile alone, two of a finger, and as many losses of several
+        most = 1024 if many else 4 * len(self._places) + 16
         self._hands: BoundedStore[_HandKey, _Hand] = BoundedStore("hands without tiles", most)
         self._stances: BoundedStore[tuple[_HandKey, ...], PreparedStance] = BoundedStore(
             "stances without tiles", 4
@@ -141,7 +145,7 @@ class Recovery:
             "plans without tiles", 256
         )
         if not many:
-            self._keep([(h, (t,), (), True) for h, t in self._places.values()])
+            self._hands_without((h, (t,), (), True) for h, t in self._places.values())
 
     @property
     def tiles(self) -> tuple[LostTile, ...]:
@@ -195,6 +199,15 @@ class Recovery:
             return first
         second = self._answer(start, lost, by_hand, gone | more, off, body_wrench)
         return second if second.utilisation < first.utilisation else first
+
+    def look_ahead(self) -> None:
+        """Work out the hands without two tiles of a finger, too, before such a loss is asked."""
+        of_finger: dict[tuple[int, int], list[int]] = {}
+        for h, t in self._places.values():
+            finger = int(self.prepared.batch.hands[h].finger_of[t])
+            of_finger.setdefault((h, finger), []).append(t)
+        pairs = [(h, two) for (h, _), own in of_finger.items() for two in combinations(own, 2)]
+        self._hands_without((h, two, (), True) for h, two in pairs)
 
     def _by_hand(self, lost: Iterable[LostTile]) -> dict[int, list[int]]:
         """Return the tiles that have slipped, by the index of their hand."""
@@ -270,35 +283,71 @@ class Recovery:
                 keys.append((h, tuple(tiles), tuple(fingers), limb not in off))
         return tuple(keys)
 
-    def _keep(self, keys: Sequence[_HandKey]) -> None:
-        """Find hands without tiles, all in one call."""
+    def _hands_without(self, keys: Iterable[_HandKey]) -> dict[_HandKey, _Hand]:
+        """Return hands without tiles; those that are new are worked out in one call."""
+        asked = list(dict.fromkeys(keys))
+        known = zip(asked, self._hands.find(asked), strict=True)
+        found = {key: hand for key, hand in known if hand is not None}
+        new = [key for key in asked if key not in found]
+        if not new:
+            return found
+        parts = {key: self._by_finger(key) for key in new}
+        of_parts = self._hands_without(part for own in parts.values() for part in own.values())
+        made = dict(self._slipped([key for key in new if not parts[key]]))
+        for key, own in parts.items():
+            if own:
+                of_fingers = {finger: of_parts[part] for finger, part in own.items()}
+                made[key] = self._joined[key[0]].join(
+                    {finger: (hand.settled, hand.space) for finger, hand in of_fingers.items()}
+                )
+        sets, at = self.prepared.hands, [h for h, *_ in made]
+        scaled = [ScaledRows.of(space) for _, space in made.values()]
+        rows = hands_data(scaled, sets.transports[at], [sets.held[h] for h in at])
+        for h, part in zip(at, rows, strict=True):
+            limits, hard, loads = self._blocks[h]
+            self._pattern[limits, loads] |= part.L != 0.0
+            self._pattern[hard, loads] |= part.H != 0.0
+        hands = {
+            key: _Hand(*hand, own, part)
+            for (key, hand), own, part in zip(made.items(), scaled, rows, strict=True)
+        }
+        self._hands.keep(hands.items())
+        return found | hands
+
+    def _by_finger(self, key: _HandKey) -> dict[int, _HandKey]:
+        """Return the hands that have lost only one finger's tiles, by finger; none of one finger.
+
+        None either of a hand that is off the rock.
+        """
+        h, tiles, released, palm = key
+        finger_of = self.prepared.batch.hands[h].finger_of.tolist()
+        fingers = {finger_of[t] for t in tiles} | {*released}
+        if not palm or len(fingers) < 2:
+            return {}
+        return {
+            finger: (h, (), (finger,), True)
+            if finger in released
+            else (h, tuple([t for t in tiles if finger_of[t] == finger]), (), True)
+            for finger in sorted(fingers)
+        }
+
+    def _slipped(
+        self, keys: Sequence[_HandKey]
+    ) -> Iterator[tuple[_HandKey, tuple[SettledHand, WrenchSpace]]]:
+        """Yield hands after slips, and their sets with the rows that the stance adds."""
         sets, whole = self.prepared.hands, self.prepared.batch.hands
         hands = [
             slipped_hand(whole[h], tiles, fingers, palm=palm) for h, tiles, fingers, palm in keys
         ]
         plain = wrench_spaces(hands, self.prepared.question.limits.tendon_tension)
-        at = [h for h, *_ in keys]
-        spaces = [sets.added[h].on(space) for h, space in zip(at, plain, strict=True)]
-        scaled = [ScaledRows.of(space) for space in spaces]
-        parts = hands_data(scaled, sets.transports[at], [sets.held[h] for h in at])
-        for h, part in zip(at, parts, strict=True):
-            limits, hard, loads = self._blocks[h]
-            self._pattern[limits, loads] |= part.L != 0.0
-            self._pattern[hard, loads] |= part.H != 0.0
-        found = map(_Hand, hands, spaces, scaled, parts)
-        self._hands.keep(zip(keys, found, strict=True))
+        for key, hand, space in zip(keys, hands, plain, strict=True):
+            yield key, (hand, sets.added[key[0]].on(space))
 
     def _prepared(self, keys: Sequence[_HandKey]) -> PreparedStance:
         """Return the stance with hands that are not whole, prepared for the solver."""
-        prepared, found = self.prepared, self._hands.find(keys)
-        new = [key for key, each in zip(keys, found, strict=True) if each is None]
-        if new:
-            self._keep(new)
-            found = self._hands.find(keys)
-        hands, others = list(prepared.batch.hands), {}
-        for (h, *_), each in zip(keys, found, strict=True):
-            assert each is not None
-            hands[h], others[h] = each.settled, (each.space, each.scaled, each.part)
+        prepared, hands, others = self.prepared, list(self.prepared.batch.hands), {}
+        for (h, *_), found in self._hands_without(keys).items():
+            hands[h], others[h] = found.settled, (found.space, found.scaled, found.part)
         # the rows as the solver takes them are in the pattern that it has already
         sets = prepared.hands.with_hands(others, self._pattern)
         return replace(prepared, batch=prepared.batch.after_slips(hands), hands=sets)

@@ -83,6 +83,10 @@ class PointsAfterSlips:
         """All tiles that can slip."""
         return self._recovery.tiles
 
+    def look_ahead(self) -> None:
+        """Work out what the loss of two tiles of a finger takes, before it is asked for."""
+        self._recovery.look_ahead()
+
     def find(self, wrench: Array, lost: Sequence[LostTile]) -> SetPoints:
         """Return the set-points for a body wrench (6,) in B [N, N·m], without lost tiles.
 

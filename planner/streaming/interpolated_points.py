@@ -97,6 +97,7 @@ class InterpolatedPoints:
         # a plan without more tiles starts from that without one
         for tile in points.tiles:
             self._following.submit(points.find, self._stance.first, [tile])
+        self._following.submit(points.look_ahead)
         return points
 
     def find(self, wrench: Array) -> SetPoints:

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 from hand_models.base import InvalidInputError, UnsupportedError
-from hand_models.fixed_wrist import slipped_hand
+from hand_models.fixed_wrist import slipped_hand, wrench_spaces
 from hand_models.hand import FINGERS
 from planner import programs
 from planner.prepare import HandBatch, prepare_stance
@@ -306,6 +306,31 @@ def test_a_plan_does_not_depend_on_where_its_search_starts(recoveries, name):
         assert one.utilisation == pytest.approx(two.utilisation, abs=1e-5)
         tensions = [each.verified.arrays.tensions for each in (one, two)]
         assert tensions[0] == pytest.approx(tensions[1], abs=0.05)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_hand_joined_from_fingers_is_that_worked_out_as_one(recoveries, name):
+    """With each tile of a finger, two of it, or the whole finger gone, beside another's."""
+    recovery, rng = recoveries[name], np.random.default_rng(8)
+    prepared = recovery.prepared
+    for h, hand in enumerate(prepared.batch.hands):
+        on = np.flatnonzero(hand.touching)
+        for count in (2, 3, 5):
+            tiles = tuple(sorted(rng.choice(on, count, replace=False).tolist()))
+            released = (int(rng.integers(len(FINGERS))),)
+            ((key, found),) = recovery._hands_without([(h, tiles, released, True)]).items()
+            settled = slipped_hand(hand, tiles, released)
+            (space,) = wrench_spaces([settled], prepared.question.limits.tendon_tension)
+            space = prepared.hands.added[h].on(space)
+            assert len({*hand.finger_of[list(tiles)], *released}) == 1 or recovery._by_finger(key)
+            for field in ("origin", "generators", "L", "l0", "s", "H", "h"):
+                mine, own = getattr(found.space, field), getattr(space, field)
+                assert mine == pytest.approx(own, rel=1e-12, abs=1e-12), (h, tiles, released, field)
+            assert found.settled.tiles == settled.tiles
+            assert found.settled.loads == pytest.approx(settled.loads, abs=1e-12)
+            assert found.settled.engagement == pytest.approx(settled.engagement, abs=1e-12)
+            torques = [np.array([t for *_, t in each.stops]) for each in (found.settled, settled)]
+            assert torques[0] == pytest.approx(torques[1], abs=1e-12)
 
 
 def test_several_losses_mostly_take_no_solver(recoveries, monkeypatch):
