@@ -404,7 +404,7 @@ def test_the_bundled_route_runs_from_end_to_end():
     check_knots(climb)
     check_rates(climb, ClimbSettings().complete())
     check_clear(climb)
-    check_between(climb, np.linspace(0.005, 0.995, 100))
+    check_between(climb, np.linspace(0.02, 0.98, 20))
 
 
 def check_clear(climb):
@@ -431,7 +431,7 @@ def test_a_bundled_route_fails_and_says_which_link_meets_what():
 @pytest.mark.slow
 def test_random_moves():
     route, rng, whole = questions.route_of(read_route("knobs")), np.random.default_rng(5), 0
-    for _ in range(25):
+    for _ in range(15):
         hand = route.start.hands[rng.choice(4, p=[0.45, 0.05, 0.05, 0.45])]
         turn = Rotation.from_rotvec(0.15 * rng.normal(size=3)).as_matrix()
         way = hand.pose.rotation @ (rng.uniform([0.05, -0.08, -0.03], [0.2, 0.08, 0.03]))
@@ -454,7 +454,7 @@ def test_random_moves():
         check_rates(found, ClimbSettings().complete())
         check_clear(found)
         check_between(found, rng.uniform(size=5))
-    assert whole >= 10
+    assert whole >= 6
 
 
 def test_a_deadline_says_how_far_the_climb_is(monkeypatch):
