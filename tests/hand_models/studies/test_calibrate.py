@@ -240,7 +240,7 @@ def shares(k: int) -> np.ndarray:
 
 @pytest.mark.slow
 def test_a_short_run_tells_intervals_numbers_and_sets(monkeypatch):
-    few = PosteriorSettings(first_sets=200, wave_sets=8, last_sets=60, walkers=40, steps=60)
+    few = PosteriorSettings(first_sets=120, wave_sets=8, last_sets=30, walkers=40, steps=60)
     monkeypatch.setattr(calibrate, "POSTERIOR_SETTINGS", few)
     monkeypatch.setattr(calibrate, "STUDY_SETTINGS", replace(STUDY_SETTINGS, calibrate_sets=4))
     told = []
