@@ -34,7 +34,7 @@ def known_fields(kind: str) -> set[str]:
 @pytest.mark.parametrize(
     "problem",
     [
-        pytest.param(each, id=each.label, marks=SLOW if each.slow or i % 4 else ())
+        pytest.param(each, id=each.label, marks=SLOW if each.slow or i % 8 else ())
         for i, each in enumerate(problems())
     ],
 )
