@@ -110,6 +110,7 @@ def squares(points, side):
     return np.unique(np.floor(points[:, [0, 2]] / side + 0.25), axis=0)
 
 
+@pytest.mark.slow
 def test_a_large_cloud_keeps_a_point_every_2_mm_and_a_small_one_100_000():
     large, small = seen(cloud(0.7)), seen(cloud(0.2))
     assert len(large.vertices) == len(squares(cloud(0.7), 0.002)) > 100_000

@@ -96,7 +96,7 @@ def compare(case: str | int, draws: int) -> tuple[int, int]:
     return int((outcome.slips > 0).sum()), int((~outcome.held).sum())
 
 
-@pytest.mark.parametrize("case", ["wall-300", 2])
+@pytest.mark.parametrize("case", ["wall-300", pytest.param(2, marks=pytest.mark.slow)])
 def test_a_plain_simulator_ends_alike(case):
     assert compare(case, 6)[0] > 0
 

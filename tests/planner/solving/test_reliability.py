@@ -28,7 +28,7 @@ from tests.suite.helpers.stances import (
     random_question,
 )
 
-FEW, MANY = 12, 60
+FEW, MANY = 6, 60
 TOLERANCE = 0.02
 
 LIGHT = Load(mass=60.0)

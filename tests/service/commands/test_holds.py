@@ -236,6 +236,7 @@ def test_a_hold_by_contact_is_where_a_plan_places_the_hand_by_contact(tmp_path, 
     assert there.position == pytest.approx(best["pose"]["position"], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_where_no_hand_comes_to_rest_the_hint_says_so(tmp_path, capfd):
     """Four fingers side by side on flat rock drag the hand along."""
     flat, output = tmp_path / "flat.ply", tmp_path / "holds.json"
