@@ -25,7 +25,7 @@ from service.requests import PlanRequest
 from tests.suite.helpers import peer
 from tests.suite.helpers.random_requests import random_request
 
-COUNT = 500
+COUNT = 300
 FEW = 20
 CLOSE = 2e-5
 
@@ -190,7 +190,7 @@ def test_a_few_random_questions_are_answered_right(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.timeout(1500)
-def test_five_hundred_random_questions_are_answered_right(tmp_path):
+def test_three_hundred_random_questions_are_answered_right(tmp_path):
     found = check(range(COUNT), tmp_path)
     print(found)
     assert found["failed"] == 0
