@@ -7,6 +7,7 @@ of sets and the welding of meshes. A budget counts programs, and ends alike on e
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -30,10 +31,16 @@ __all__ = [
 
 
 class _Clock(NamedTuple):
-    """End of the time, on the clock of `time.perf_counter`, and how long it was [s]."""
+    """End of the time, on the clock of `time.perf_counter`, how long it was [s], and its stop."""
 
     end: float
     seconds: float
+    stop: threading.Event | None = None
+
+    @property
+    def left(self) -> float:
+        stopped = self.stop is not None and self.stop.is_set()
+        return 0.0 if stopped else max(0.0, self.end - time.perf_counter())
 
 
 _clock: ContextVar[_Clock | None] = ContextVar("_clock", default=None)
@@ -110,7 +117,9 @@ class DeadlineError(CruxError):
 
 
 @contextmanager
-def within(seconds: float | None, *, started: float | None = None) -> Iterator[None]:
+def within(
+    seconds: float | None, *, started: float | None = None, stop: threading.Event | None = None
+) -> Iterator[None]:
     """Context manager that sets a deadline for the code inside the ``with`` block.
 
     An earlier deadline of an enclosing block stays in force.
@@ -121,6 +130,8 @@ def within(seconds: float | None, *, started: float | None = None) -> Iterator[N
         Duration until the deadline [s]; None sets no deadline.
     started : float, optional
         Start of that duration, in seconds of `time.perf_counter`; now by default.
+    stop : threading.Event, optional
+        Another thread sets it to end the duration at once.
 
     Raises
     ------
@@ -132,7 +143,7 @@ def within(seconds: float | None, *, started: float | None = None) -> Iterator[N
         yield
         return
     start = time.perf_counter() if started is None else started
-    own, clock = _Clock(start + seconds, seconds), _clock.get()
+    own, clock = _Clock(start + seconds, seconds, stop), _clock.get()
     token = _clock.set(own if clock is None or own.end < clock.end else clock)
     try:
         with broken_off_by(_mind_hands):
@@ -154,13 +165,13 @@ def seconds() -> float | None:
 def left() -> float | None:
     """Return the time until the deadline [s], not below zero; None without a deadline."""
     clock = _clock.get()
-    return None if clock is None else max(0.0, clock.end - time.perf_counter())
+    return None if clock is None else clock.left
 
 
 def expired() -> bool:
     """Return whether the deadline has expired; False without a deadline."""
     clock = _clock.get()
-    return clock is not None and time.perf_counter() >= clock.end
+    return clock is not None and clock.left <= 0.0
 
 
 def check(missing: str) -> None:
@@ -178,7 +189,7 @@ def check(missing: str) -> None:
         If the deadline has expired.
     """
     clock = _clock.get()
-    if clock is not None and time.perf_counter() >= clock.end:
+    if clock is not None and clock.left <= 0.0:
         raise DeadlineError(clock.seconds, missing)
 
 

@@ -42,7 +42,7 @@ from service.serving import CruxClient
 from service.wire import ServiceError
 from tests.suite.helpers import peer
 from tests.suite.helpers.named_rows import most_given, named_rows
-from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.patience import PATIENCE, soon
 from tests.suite.helpers.requests import HEAVY, MSGPACK, plan_request, wall_request
 from tests.suite.helpers.served import Served, client_config, free_endpoint
 from tests.suite.helpers.stances import CALIBRATION_LOAD, ask, on_wall
@@ -106,6 +106,20 @@ def in_time(name: str) -> Plan:
 
 
 # The clock ----------------------------------------------------------------------------------------
+
+
+def test_another_thread_ends_the_time():
+    stop = threading.Event()
+    with deadline.within(LONG, stop=stop):
+        assert deadline.left() > 0.0
+        # an earlier end of an inner block leaves the outer one as it is
+        with deadline.within(2.0 * LONG):
+            threading.Thread(target=stop.set).start()
+            assert soon(deadline.expired)
+        assert deadline.left() == 0.0
+        with pytest.raises(DeadlineError):
+            deadline.check("all was tried")
+    assert deadline.left() is None
 
 
 def test_an_earlier_end_outside_stays_and_a_later_one_gives_way(clock):
