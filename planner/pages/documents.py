@@ -25,7 +25,7 @@ def document(title: str, data: dict[str, Any]) -> str:
     title : str
         Title of the page.
     data : dict of str to object
-        What ``page.js`` shows.
+        What ``page.js`` shows; with ``live``, ``live.js`` lets a person change it.
 
     Raises
     ------
@@ -46,7 +46,8 @@ def document(title: str, data: dict[str, Any]) -> str:
         "style": _part("page.css"),
         "plotly": packed,
         "data": text.replace("<", "\\u003c"),
-        "script": _part("page.js"),
+        "script": _part("page.js")
+        + (_part("live.js") if "live" in data else "\nstart().catch(unable);\n"),
     }
     page = _part("page.html")
     for name, part in parts.items():

@@ -4,6 +4,7 @@ const data = JSON.parse(byId("data").textContent);
 const hasRobot = data.stages.some((stage) => stage.scene?.arrows.length);
 const shownKinds = { rock: true, ...(hasRobot ? { robot: true, "forces of hands": true, "forces of tiles": false } : {}) };
 for (const group of data.groups ?? []) shownKinds[group.name] = true;
+const moreTraces = []; // functions of a scene
 let at = data.crux ?? 0, order = {}, drawnAdvice = null, ranges;
 
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
@@ -145,6 +146,7 @@ function sceneTraces(scene) {
     ...groupTraces(), ...adviceTraces(),
     ...tilesOf(scene.tiles, shownKinds["forces of tiles"]),
     ...arrowsOf(scene.arrows, shownKinds["forces of hands"]),
+    ...moreTraces.flatMap((each) => each(scene)),
   ];
 }
 
@@ -154,11 +156,19 @@ const axis = (title) => ({ title: { text: title }, color: ink("dim"), gridcolor:
 const vector = (v, length) => Object.fromEntries(["x", "y", "z"].map((c, k) => [c, length * v[k]]));
 function cameraOf(view) { // farther away in a narrow window, and from what is flat
   const { clientWidth, clientHeight } = byId("scene"), sizes = ranges.map(([low, high]) => high - low);
-  const flat = Math.max(...sizes) / Math.cbrt(sizes[0] * sizes[1] * sizes[2]), far = 1.75 * Math.max(1, flat) * Math.max(1, 1.1 * clientHeight / clientWidth);
+  const flat = Math.max(...sizes) / Math.cbrt(sizes[0] * sizes[1] * sizes[2]), titles = data.groups ? 1.25 : 1.1;
+  const far = 1.75 * Math.max(1, flat) * Math.max(1, titles * clientHeight / clientWidth);
   return { eye: vector(view.eye, far), up: vector(view.up, 1), center: vector([0, 0, 0], 0) };
 }
 
-function bounds() { // of all stages, so that the view stays still
+let camera;
+function keptCamera() { // where a person has turned it; plotly's own would drift by rounding
+  const now = byId("scene")._fullLayout.scene._scene.getCamera();
+  const same = ["eye", "up", "center"].every((name) => ["x", "y", "z"].every((c) => Math.abs(now[name][c] - camera[name][c]) < 1e-6));
+  return same ? camera : now;
+}
+
+function bounds() { // of all stages and places, so that the view stays still
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
   const add = (p) => p.forEach((v, k) => { if (Number.isFinite(v)) { low[k] = Math.min(low[k], v); high[k] = Math.max(high[k], v); } });
   for (const { scene, advice } of data.stages) {
@@ -166,6 +176,7 @@ function bounds() { // of all stages, so that the view stays still
     scene?.arrows.forEach((arrow) => add(arrow.tip));
     advice?.forEach((a) => a.moves?.forEach((m) => m.to?.forEach(add)));
   }
+  for (const { places } of data.groups ?? []) places.forEach(add);
   return [0, 1, 2].map((k) => low[k] > high[k] ? [-1, 1] : [low[k] - 0.05, high[k] + 0.05]);
 }
 
@@ -181,8 +192,9 @@ function drawScene(view) {
   const scene = data.stages[at].scene;
   const axes = Object.fromEntries(["x", "y", "z"].map((c, k) => [`${c}axis`, { ...axis(`${c} of ${data.frame ?? "W"} [m]`), range: ranges[k], nticks: 4 }]));
   const layout = { margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: ink("back"), showlegend: false, uirevision: "kept",
-    hoverlabel: { align: "left" }, scene: { ...axes, aspectmode: "data", dragmode: "orbit", annotations: scene ? annotationsOf(scene) : [] } };
-  if (view) layout.scene.camera = cameraOf(view);
+    hoverlabel: { align: "left" }, scene: { ...axes, domain: { y: [data.groups?.some((g) => g.values) ? 0.12 : 0, 1] }, // above the bar of colours
+      aspectmode: "data", dragmode: "turntable", annotations: scene ? annotationsOf(scene) : [] } };
+  layout.scene.camera = camera = view ? cameraOf(view) : keptCamera();
   return Plotly.react(byId("scene"), scene ? sceneTraces(scene) : [], layout, config);
 }
 
@@ -286,12 +298,16 @@ function listedAdvice(advice) {
   if (chosen()?.table) { drawTable(chosen().table, place); byId("notes").append(made("h2", chosen().table.title), place); }
 }
 
-function showWords(stage) {
+function showOutcome(stage) {
   const parts = Number.isFinite(stage.utilisation) ? [`utilisation ${fixed(stage.utilisation, 2)} of ${stage.limit}`] : [];
   if (Number.isFinite(stage.load_factor)) parts.push(`load factor ${fixed(stage.load_factor, 2)}`);
   else if (stage.load_factor_status === "unbounded") parts.push("load factor unbounded");
   byId("outcome").replaceChildren(made("span", stage.status, `status ${stage.status}`), parts.join(", "));
   byId("sentence").textContent = stage.sentence;
+}
+
+function showWords(stage) {
+  showOutcome(stage);
   byId("notes").replaceChildren();
   if (stage.advice?.length) listedAdvice(stage.advice);
   else if (stage.advice) listed("Advice", ["no change that was tried helps"]);
@@ -353,7 +369,7 @@ async function start() {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show());
 }
 
-start().catch((error) => {
+function unable(error) {
   byId("sentence").append(made("strong", ` This page cannot be drawn here: ${error.message}`));
   console.error(error);
-});
+}

@@ -79,6 +79,16 @@ ADVISED = """
 """
 
 
+PLACES = """
+  const axes = document.getElementById("scene")._fullLayout.scene;
+  const within = (c, axis) => axes[axis].range[0] < c && c < axes[axis].range[1];
+  const inside = (p) => ["x", "y", "z"].every((c, k) => within(p[k], c + "axis"));
+  seen.within = data.groups.every((g) => g.places.every(inside));
+  const bar = document.querySelector("#scene .cbfills").getBoundingClientRect();
+  seen.below = axes._scene.container.getBoundingClientRect().bottom <= bar.top;
+"""
+
+
 def opened(file, steps=""):
     """What a browser shows of a page once its buttons were pressed, and what was seen meanwhile."""
     text = file.read_text("utf-8").replace("</body>", PRESSED.replace("STEPS", steps))
@@ -145,8 +155,9 @@ def test_a_search_is_drawn_on_its_rock_with_its_placements(tmp_path, capfd):
     corners = np.frombuffer(b64decode(data["meshes"][rocks[0]["corners"]]), "<f4").reshape(-1, 3)
     away, _ = cKDTree(corners).query(wall["place_pose"][:, :, 3])
     assert away.max() < 0.05
-    seen, page = opened(file)
+    seen, page = opened(file, PLACES)
     assert "the bound is about the placements" in page
+    assert (seen["within"], seen["below"]) == (True, True)
     assert seen["traces"] == 15 + 2
 
 
