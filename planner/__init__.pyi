@@ -43,6 +43,7 @@ from .explanation import (
     constraint_words as constraint_words,
 )
 from .pages import (
+    LivePage as LivePage,
     PageTable as PageTable,
     PlaceGroup as PlaceGroup,
     write_climb_page as write_climb_page,

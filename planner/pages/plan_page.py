@@ -41,7 +41,9 @@ def write_plan_page(plan: Plan, question: Question, path: Path, title: str) -> N
     write_document(title, {"stages": [shown], "meshes": meshes.packed, "said": meshes.said}, path)
 
 
-def shown_plan(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]:
+def shown_plan(
+    plan: Plan, question: Question, meshes: Meshes, *, brief: bool = False
+) -> dict[str, Any]:
     """Return what a page shows of a plan, as plain data.
 
     Parameters
@@ -52,9 +54,11 @@ def shown_plan(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]
         Question that the plan answers.
     meshes : Meshes
         Meshes of the page, to which those of the plan are added.
+    brief : bool, optional
+        True to leave out slices, tables and advice, which take most of the time.
     """
     cap = question.limits.utilisation
-    return {
+    found = {
         "status": plan.status,
         "sentence": plan.reason,
         "utilisation": plan.utilisation,
@@ -62,9 +66,13 @@ def shown_plan(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]
         "load_factor": plan.load_factor,
         "load_factor_status": plan.load_factor_status,
         "scene": scene_data(plan, question, meshes),
+        "warnings": list(plan.warnings),
+    }
+    if brief:
+        return found
+    return found | {
         "slices": [_slice(hand) for hand in plan.hands or ()],
         "tables": [each._asdict() for each in plan_tables(plan, question)],
-        "warnings": list(plan.warnings),
         "advice": advice_data(plan, question),
     }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from base64 import b64encode
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,12 @@ class Meshes:
         self.said: list[str] = []
         self._known: dict[str, int] = {}
         self._links: dict[Robot, list[tuple[LinkMesh, dict[str, Any]]]] = {}
+
+    def more(self) -> Meshes:
+        """Return these meshes again, to which others can be added without adding them here."""
+        found = copy(self)
+        found.packed, found._known = list(self.packed), dict(self._known)
+        return found
 
     def index_of(self, numbers: Array | Indices) -> int:
         """Return the place among ``packed`` of corners, or of triangles, shape (n, 3)."""

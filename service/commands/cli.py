@@ -100,7 +100,7 @@ COMMANDS_BY_NAME: Final = {
         "Let tiles slip at random: count how often all hands hold, with new set-points or without.",
     ),
     "stream": Entry(
-        "stream",
+        "live",
         "Give set-points for one body wrench after another, read line by line.",
     ),
     "study": Entry(
@@ -110,6 +110,10 @@ COMMANDS_BY_NAME: Final = {
     "sweep": Entry(
         "sweep",
         "Plan a stance over varied fields: a table, a picture, and where it stops holding.",
+    ),
+    "view": Entry(
+        "live",
+        "Open a page to drag the body and the hands on their rock; the plan follows.",
     ),
     "wrench-space": Entry("spaces", "Show what one hand can carry."),
 }

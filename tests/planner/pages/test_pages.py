@@ -22,6 +22,7 @@ from planner import evaluate
 from planner.advice import changed
 from planner.advice.changes import pose_message
 from planner.pages import (
+    LivePage,
     Meshes,
     document,
     scene_data,
@@ -164,6 +165,23 @@ def test_a_page_of_a_climb_has_all_stages_and_the_margin_along_them(tmp_path):
     assert first == second
 
 
+def test_a_plan_that_replaces_another_brings_the_meshes_that_it_has():
+    question, plan = answered("solved")
+    moved = replace(question.stance, body=Pose(question.stance.body.position + 0.01, np.eye(3)))
+    moved = replace(question, stance=replace(moved, joints=None))
+    page = LivePage("a wall")
+    first = data_of(page.document(plan, question, {"handles": {}}))
+    kept, scene = first["meshes"][: first["live"]["kept"]], drawn_scene(plan, moved, 5)
+    for brief in (True, False):
+        update = page.update(plan, moved, brief=brief)
+        assert ("slices" in update["stage"]) is not brief
+        now = {"meshes": [*kept, *update["meshes"]]}
+        bodies = (s for s in update["stage"]["scene"]["surfaces"] if s["kind"] == "body")
+        drawn = (s for s in scene.surfaces if s.kind == "body")
+        for body, surface in zip(bodies, drawn, strict=True):
+            np.testing.assert_allclose(unpacked(now, body), surface.triangles, atol=6e-5)
+
+
 def test_a_page_loads_nothing_and_ends_no_script_by_its_words(tmp_path):
     question, plan = answered("solved")
     title = "</script><script src='http://example.org/x.js'></script>"
@@ -246,6 +264,15 @@ def test_links_are_drawn_as_the_meshes_of_the_robots_file(tmp_path):
     np.testing.assert_allclose(middle, chain[1] + 0.3 * along, atol=1e-3)
     assert [each["kind"] for each in scene["surfaces"]].count("link") == 1
     assert meshes.said == []
+    # a page whose plans replace each other keeps the links' meshes
+    page = LivePage("a leg")
+    brought = page.update(plan, question, brief=True)
+    first = data_of(page.document(plan, question, {}))
+    (again,) = (s for s in brought["stage"]["scene"]["surfaces"] if s["kind"] == "mesh")
+    assert max(again["corners"], again["triangles"]) < first["live"]["kept"]
+    kept = first["meshes"][: first["live"]["kept"]]
+    found = unpacked({"meshes": [*kept, *brought["meshes"]]}, again)
+    np.testing.assert_array_equal(found.reshape(-1, 3) @ frame[:, :3].T, corners)
 
 
 def test_meshes_of_many_triangles_are_drawn_coarsely_which_is_said(tmp_path, monkeypatch):

@@ -1,21 +1,30 @@
-"""Define ``crux stream``: turn body wrenches into set-points of the tendons, line by line."""
+"""Define commands that answer again and again: ``crux stream`` lines, ``crux view`` a page."""
 
 from __future__ import annotations
 
+import signal
 import sys
 import textwrap
 import time
+import webbrowser
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 import msgspec
 
 import planner
 from hand_models.base import InvalidInputError, Strict, UnsupportedError
-from service import answering, replies, requests, tables, wire
+from service import answering, replies, requests, serving, tables, viewing, wire
 from service.commands import options, stances
+from service.commands.network import zenoh_options
 
-__all__ = ["stream_command"]
+if TYPE_CHECKING:
+    import zenoh
+
+__all__ = ["stream_command", "view_command"]
 
 
 @click.command("stream")
@@ -85,6 +94,84 @@ def stream_command(stance: str, radius: float, own: options.Own, as_json: bool) 
                 _say_line(reply, width)
             worst = min(worst, status.of(reply.status), key=worst_first.index)
     return worst
+
+
+@click.command("view")
+@options.stance_argument
+@click.option(
+    "-o",
+    "--output",
+    "output",
+    type=options.OutputFile(".json"),
+    metavar="FILE",
+    help="Where the page's button saves the moved stance; by default STANCE-moved.json.",
+)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=0,
+    metavar="PORT",
+    help="Of the page, on this machine; by default any that is free.",
+)
+@click.option("--no-browser", is_flag=True, help="Print the page's address, and open no browser.")
+@click.option(
+    "--follow", is_flag=True, help="Show the set-points and slips that a service publishes."
+)
+@zenoh_options
+@options.own_options
+@options.json_option
+def view_command(
+    stance: str,
+    output: Path | None,
+    port: int,
+    no_browser: bool,
+    follow: bool,
+    config: zenoh.Config,
+    own: options.Own,
+    as_json: bool,
+) -> int:
+    """Open a page to drag the body and the hands on their rock; the plan follows. Ctrl-C ends it.
+
+    Only browsers of this machine that have the whole address, with its token, are answered. Zenoh's
+    flags count with --follow alone. --json prints the address as JSON.
+    """
+    request, given = stances.read_with_text(stance)
+    name = "stance" if stance == "-" else Path(stance).stem
+    file = output or Path(f"{name}-moved.json")
+    tables.write_alone(file)
+    with tables.waiting(f"planning {stance}", request):
+        movable = viewing.MovableStance(own.asked(request), own.robots)
+        live = viewing.LivePlan(movable, name, file, given)
+        live.plan(viewing.StanceMoves(), brief=True)  # the first compiles
+    with ExitStack() as ends:
+        streams = None
+        if follow:
+            serving.start_zenoh_log()
+            session = ends.enter_context(serving.open_session(config))
+            robot = request.stance.robot or wire.DEFAULT_ROBOT
+            streams = viewing.FollowedStreams(session, robot)
+        try:
+            server = ends.enter_context(viewing.LiveServer(live, port, streams))
+        except OSError as error:
+            raise InvalidInputError(
+                f"port {port} cannot be had: {error.strerror}; name another", field="--port"
+            ) from None
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.default_int_handler)
+        try:
+            if as_json:
+                tables.say({"v": 1, "address": server.address})
+            else:
+                click.echo(server.address)
+            if not no_browser and not webbrowser.open(server.address):
+                tables.remark("no browser was found: open the address in one")
+            tables.remark("Ctrl-C ends it")
+            server.serve_forever()
+        except KeyboardInterrupt:
+            tables.remark("ended")
+        finally:
+            live.close()
+    return tables.ExitStatus.DONE
 
 
 def _declared(plan: requests.PlanRequest, radius: float) -> requests.StreamRequest:

@@ -1,0 +1,137 @@
+"""The live page in headless Chromium: dragged with the mouse and keys, undone, and saved."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+import planner
+from service import answering
+from service.answering.own_models import BUNDLED_ROBOTS
+from service.commands.stances import read_request, read_with_text
+from service.viewing import LivePlan, LiveServer, MovableStance
+from tests.suite.helpers.browser import PROGRAM, Browser
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(PROGRAM is None, reason="Chromium is not installed"),
+]
+
+REST = "!busy && !wanted && !document.body.classList.contains('stale')"
+
+
+class Published:
+    """Streams with one slip, in place of a service's."""
+
+    def after(self, count, seconds):
+        lost = [{"limb": "rear_left", "finger": "inner_left", "phalanx": "distal"}]
+        hand = {"limb": "rear_left", "tensions": [40.0, 41.0, 42.0, 43.0]}
+        points = {"status": "optimal", "utilisation": 0.9, "hands": [hand], "lost": lost}
+        reply = {"stream": "7", "number": 3, "age": 0.002, "skipped": 0, "set_points": points}
+        if count:
+            threading.Event().wait(0.2)
+        return {"count": 1, "reply": None if count else reply | {"error": None}}
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    """A browser with the page of wall-300, and the file that is saved."""
+    folder = tmp_path_factory.mktemp("live")
+    request, given = read_with_text("wall-300")
+    file = folder / "moved.json"
+    plan = LivePlan(MovableStance(request, BUNDLED_ROBOTS), "wall", file, given)
+    with LiveServer(plan, 0, Published()) as server, Browser(folder / "profile") as browser:
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        browser.open(server.address)
+        yield browser, file
+        server.shutdown()
+        thread.join()
+
+
+def middle(browser, name):
+    script = f"document.querySelector('[data-limb={name}]').getBoundingClientRect().toJSON()"
+    box = browser.run(script)
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def drag(browser, name, dx, dy, steps=5):
+    x, y = middle(browser, name)
+    browser.mouse("mousePressed", x, y)
+    for n in range(1, steps + 1):
+        browser.mouse("mouseMoved", x + dx * n / steps, y + dy * n / steps)
+        browser.until("!busy")
+    return x, y
+
+
+def shown(browser):
+    browser.until(REST)
+    return browser.run("[data.stages[0].utilisation, byId('outcome').textContent, moves]")
+
+
+def test_a_person_drags_undoes_and_saves(page):
+    browser, file = page
+    first = shown(browser)
+    # while the mouse is down the plan has changed already, and the ring is under the mouse
+    x, y = drag(browser, "front_right", 0, -20)
+    browser.until("data.stages[0].utilisation < 0.95 && !busy")
+    browser.mouse("mouseReleased", x, y - 20)
+    second = shown(browser)
+    assert second[1] != first[1]
+    at = middle(browser, "front_right")
+    assert at == pytest.approx((x, y - 20), abs=3)
+    x, y = drag(browser, "body", 30, 10)
+    browser.mouse("mouseReleased", x + 30, y + 10)
+    third = shown(browser)
+    assert middle(browser, "body") == pytest.approx((x + 30, y + 10), abs=3)
+    browser.run("byId('save').click()")
+    browser.until("byId('said').textContent.startsWith('saved')")
+    request = read_request(str(file))
+    plan = planner.plan(answering.question(request))
+    assert plan.utilisation == pytest.approx(third[0], rel=1e-6)
+    browser.run("byId('undo').click()")
+    assert shown(browser)[:2] == second[:2]
+    browser.press("z", 2)
+    assert shown(browser) == first
+    assert browser.run("byId('undo').disabled")
+    # by a millimetre, along the axis of the hand that looks most like the arrow; shift: by ten
+    browser.run("document.querySelector('[data-limb=rear_left]').focus()")
+    browser.press("ArrowUp")
+    browser.press("ArrowRight", 8)
+    # the hand's x is up the wall, and its y to the right of who faces the wall
+    assert shown(browser)[2]["hands"] == {"rear_left": [0.001, 0.01]}
+    # off the rock there are words, and the last plan stays
+    browser.run("change(withShift('rear_left', [3, 0]))")
+    browser.until("byId('said').classList.contains('wrong')")
+    assert "there is no rock 3000 mm along x" in browser.run("byId('said').textContent")
+    browser.press("z", 2)
+    shown(browser)
+    assert browser.errors == []
+
+
+def test_a_stream_is_shown_and_the_page_fits(page):
+    browser, _ = page
+    browser.until("document.body.dataset.followed === '1'")
+    assert browser.run("byId('stream-words').textContent").startswith("optimal, utilisation 0.90")
+    assert browser.run("byId('stream-lost').textContent") == "slipped: rear left inner left distal"
+    assert browser.run("byId('stream-table').querySelectorAll('td').length") == 12
+    (cross,) = browser.run("byId('scene').data.at(-1).text")
+    assert cross == "rear left, inner left, distal: slipped"
+    for width in (1280, 390):
+        for dark in (False, True):
+            browser.resize(width, 900, dark=dark)
+            browser.until("document.documentElement.scrollWidth <= innerWidth")
+    # hover with the mouse itself shows the numbers of a tile
+    browser.resize(1280, 900)
+    browser.until("byId('scene')._fullLayout.width > 1000")
+    browser.run("hit = data.stages[0].scene.tiles.find((t) => t.phalanx === 'distal').start")
+    box = browser.run("byId('scene').getBoundingClientRect().toJSON()")
+    x, y = browser.run("pixelOf(hit)")
+    for off in (2, 1, 0, 1):
+        browser.mouse("mouseMoved", box["x"] + x + off, box["y"] + y, held=False)
+        browser.run("new Promise((go) => setTimeout(go, 100))")
+    told = "document.querySelector('.hovertext')?.textContent"
+    browser.until(f"/shear .* N, normal .* N/.test({told})")
+    assert browser.errors == []
+    assert not browser.run("busy")
