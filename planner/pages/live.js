@@ -214,4 +214,7 @@ function begin() {
 }
 
 begin();
-start().then(() => { if (live.follows) followStreams(); }).catch(unable);
+start().then(() => {
+  if (data.stages[0].status !== "optimal") advise(moves);
+  if (live.follows) followStreams();
+}).catch(unable);

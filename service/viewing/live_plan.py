@@ -100,13 +100,22 @@ class LivePlan:
         """Write the moved stance as a request of its own, and return the file's name.
 
         Other fields stay as they were given, and scans stay in their files.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is no such stance, or the file cannot be written.
         """
         text, before, files = self._given
         moved = self._stance.moved(moves)
         if files is not None:
             moved = files.named(moved, before, self._file.parent)
-        with whole_file(self._file) as part:
-            part.write_bytes(msgspec.json.format(answering.rewritten(text, before, moved)))
+        content = msgspec.json.format(answering.rewritten(text, before, moved))
+        try:
+            with whole_file(self._file) as part:
+                part.write_bytes(content)
+        except OSError as error:
+            raise InvalidInputError(f"{self._file}: {error.strerror}", field="-o") from None
         return str(self._file)
 
     def _planned(self, moves: StanceMoves, *, brief: bool) -> tuple[planner.Question, planner.Plan]:

@@ -6,6 +6,7 @@ import hmac
 import secrets
 from collections.abc import Callable, Mapping
 from http import HTTPStatus
+from http.client import HTTP_PORT
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -76,7 +77,8 @@ class LiveServer(ThreadingHTTPServer):
     def __init__(self, plan: LivePlan, port: int, streams: FollowedStreams | None = None) -> None:
         super().__init__(("127.0.0.1", port), _Handler)
         self.token = secrets.token_urlsafe(24)
-        self.hosts = {f"{name}:{self.server_port}" for name in ("127.0.0.1", "localhost")}
+        ending = "" if self.server_port == HTTP_PORT else f":{self.server_port}"
+        self.hosts = {f"{name}{ending}" for name in ("127.0.0.1", "localhost")}
         self.address = f"http://127.0.0.1:{self.server_port}/?token={self.token}"
         self.follows = streams is not None
         self._plan, self._streams = plan, streams
@@ -133,6 +135,10 @@ class _Handler(BaseHTTPRequestHandler):
             return
         except CruxError as error:
             content = {"error": str(error)}
+        except Exception:
+            words = "crux view has failed on this; its output in the terminal says where"
+            self._refuse(_RefusedError(HTTPStatus.INTERNAL_SERVER_ERROR, words))
+            raise
         self._send(HTTPStatus.OK, msgspec.json.encode(content), "application/json")
 
     def _check(self, known: bool, token: str) -> None:

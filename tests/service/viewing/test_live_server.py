@@ -142,6 +142,26 @@ def test_a_moved_stance_is_planned_and_saved_as_crux_plan_has_it(live):
     assert back["utilisation"] == unmoved.utilisation
 
 
+def test_what_goes_wrong_is_said(live, monkeypatch, capfd):
+    server, file = live
+
+    def failing(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(viewing.live_plan, "whole_file", failing)
+    assert answer(server, "/save", moves={})["error"] == f"-o: {file}: No space left on device"
+    monkeypatch.setattr(viewing.live_plan.planner, "plan", lambda _: 1 / 0)
+    status, _, text = asked(server, "POST", "/plan", b"{}")
+    assert (status, "crux view has failed" in text) == (500, True)
+    said = []
+
+    def told():
+        said.append(capfd.readouterr().err)
+        return "ZeroDivisionError" in "".join(said)
+
+    assert soon(told)
+
+
 def test_a_newer_question_ends_the_search_for_advice(live, monkeypatch):
     server, _ = live
     begun, found = threading.Event(), []
