@@ -112,6 +112,7 @@ class _Handler(BaseHTTPRequestHandler):
     server: LiveServer
     protocol_version = "HTTP/1.1"
     timeout = VIEWING_SETTINGS.socket_timeout
+    disable_nagle_algorithm = True  # the body would wait for the receipt of the head, for 40 ms
 
     def do_GET(self) -> None:
         try:
