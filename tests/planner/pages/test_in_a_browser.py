@@ -81,9 +81,15 @@ ADVISED = """
 
 PLACES = """
   const axes = document.getElementById("scene")._fullLayout.scene;
-  const within = (c, axis) => axes[axis].range[0] < c && c < axes[axis].range[1];
-  const inside = (p) => ["x", "y", "z"].every((c, k) => within(p[k], c + "axis"));
-  seen.within = data.groups.every((g) => g.places.every(inside));
+  const around = (limits) => data.groups.every(({ places }) => places.every((place) =>
+    place.every((c, k) => limits[k][0] < c && c < limits[k][1])));
+  seen.within = around(["x", "y", "z"].map((c) => axes[c + "axis"].range));
+  // also of a page with the rock alone, as there is without a climb
+  for (const { scene } of data.stages) {
+    scene.surfaces = scene.surfaces.filter((surface) => surface.kind === "rock");
+    scene.arrows = [];
+  }
+  seen.within &&= around(bounds());
   const bar = document.querySelector("#scene .cbfills").getBoundingClientRect();
   seen.below = axes._scene.container.getBoundingClientRect().bottom <= bar.top;
 """
