@@ -103,9 +103,14 @@ async function take({ stage, meshes, handles }, brief) {
   live.handles = handles;
   drawnAdvice = null;
   data.stages[0] = brief ? { ...data.stages[0], advice: null, ...stage } : stage;
-  if (!brief) return show();
+  if (!brief) { widen(); return show(); }
   showOutcome(stage);
   await drawScene();
+}
+
+function widen() { // the axes, where something has left them
+  const now = bounds(0), wide = bounds(0.2), left = ranges.some(([low, high], k) => now[k][0] < low || now[k][1] > high);
+  if (left) ranges = ranges.map(([low, high], k) => [Math.min(low, wide[k][0]), Math.max(high, wide[k][1])]);
 }
 
 async function advise(asked) {

@@ -168,7 +168,7 @@ function keptCamera() { // where a person has turned it; plotly's own would drif
   return same ? camera : now;
 }
 
-function bounds() { // of all stages and places, so that the view stays still
+function bounds(spare = 0.05) { // of all stages and places, so that the view stays still
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
   const add = (p) => p.forEach((v, k) => { if (Number.isFinite(v)) { low[k] = Math.min(low[k], v); high[k] = Math.max(high[k], v); } });
   for (const { scene, advice } of data.stages) {
@@ -177,7 +177,7 @@ function bounds() { // of all stages and places, so that the view stays still
     advice?.forEach((a) => a.moves?.forEach((m) => m.to?.forEach(add)));
   }
   for (const { places } of data.groups ?? []) places.forEach(add);
-  return [0, 1, 2].map((k) => low[k] > high[k] ? [-1, 1] : [low[k] - 0.05, high[k] + 0.05]);
+  return [0, 1, 2].map((k) => low[k] > high[k] ? [-1, 1] : [low[k] - spare, high[k] + spare]);
 }
 
 function annotationsOf(scene) { // texts over the scene: as meshes they take a second
@@ -344,7 +344,7 @@ async function start() {
   byId("over").style.background = data.colours.overload;
   const packed = (await fetch(`data:;base64,${byId("plotly").textContent}`)).body.pipeThrough(new DecompressionStream("gzip"));
   document.head.append(made("script", await new Response(packed).text()));
-  ranges = bounds();
+  ranges = bounds(data.live ? 0.2 : 0.05); // [m] that what is dragged stays in sight
   const views = data.stages.find((s) => s.scene)?.scene.views ?? {};
   for (const [name, view] of Object.entries(views)) {
     const button = made("button", name);
