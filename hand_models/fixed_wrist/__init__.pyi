@@ -21,6 +21,7 @@ from .hold_trials import (
 )
 from .kept_hands import (
     ClosedPlacement as ClosedPlacement,
+    check_made_with as check_made_with,
     input_digests as input_digests,
     read_hands as read_hands,
     write_hands as write_hands,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -33,7 +33,7 @@ from hand_models.hand import (
 from hand_models.rock import Mesh
 from hand_models.tile import Surface
 
-__all__ = ["ClosedPlacement", "input_digests", "read_hands", "write_hands"]
+__all__ = ["ClosedPlacement", "check_made_with", "input_digests", "read_hands", "write_hands"]
 
 FILE_FORMAT: Final = "crux closed hands 2"
 """First array of a file of closed hands."""
@@ -154,17 +154,8 @@ def read_hands(path: Path, rock: Mesh, surface: Surface, hand: SpinyHand) -> lis
         if str(arrays.get("format")) != FILE_FORMAT:
             raise InvalidInputError(f"is not a file of closed hands: {path}", field="file")
         now = input_digests(rock, surface, hand.table.sections)
-        differ = [
-            name
-            for (name, there), was in zip(now.items(), arrays["made_with"].tolist(), strict=True)
-            if was != there
-        ]
-        if differ:
-            raise InvalidInputError(
-                f"was made with another {' and another '.join(differ)}: close the hands again, and "
-                f"write them anew: {path}",
-                field="file",
-            )
+        again = f"close the hands again, and write them anew: {path}"
+        check_made_with(now, arrays["made_with"].tolist(), again)
         closed = [
             _closed(arrays, i, rock, surface, hand) for i in range(len(arrays["closing_tension"]))
         ]
@@ -210,6 +201,15 @@ def input_digests(rock: Mesh, surface: Surface, sections: Any) -> dict[str, str]
         "surface": sha256(repr(replace(surface, name=None)).encode()).hexdigest(),
         "hand": sha256(repr(numbers).encode()).hexdigest(),
     }
+
+
+def check_made_with(now: Mapping[str, str], before: Iterable[str], again: str) -> None:
+    """Raise if a file was made with other inputs, by their digests; ``again``: what to do then."""
+    differ = [name for (name, new), old in zip(now.items(), before, strict=True) if new != old]
+    if differ:
+        raise InvalidInputError(
+            f"was made with another {' and another '.join(differ)}: {again}", field="file"
+        )
 
 
 def _closed(

@@ -49,13 +49,10 @@ def plot_survival(
     _draw_cascade(timeline, found)
     _draw_curves(curves, over_load)
     _draw_agreement(agreement, over_load)
-    moduli = ", ".join(
-        f"m = {s.modulus:.3g} on {s.surface or 'own surface'} ({s.source})" for s in found.surfaces
-    )
     figure.suptitle(
-        f"{title}: when tiles slip\nWeibull modulus {moduli}\nstrengths {found.strength:g} times "
-        f"those assumed; scatter of holds {found.hold_scatter:g}, of the rock "
-        f"{found.rock_scatter:g}",
+        f"{title}: when tiles slip\nWeibull modulus {found.moduli}\nstrengths "
+        f"{found.strength:g} times those assumed; scatter of holds {found.hold_scatter:g}, of the "
+        f"rock {found.rock_scatter:g}",
         fontsize=11,
         parse_math=False,
     )

@@ -136,6 +136,14 @@ class Survival(Struct, frozen=True, kw_only=True):
     reason: str | None = None
 
     @property
+    def moduli(self) -> str:
+        """Weibull modulus of each surface with its source, as words."""
+        return ", ".join(
+            f"m = {s.modulus:.3g} on {s.surface or 'own surface'} ({s.source})"
+            for s in self.surfaces
+        )
+
+    @property
     def tail(self) -> str | None:
         """Sentence about a survival above 0.95; None if there is none."""
         shares = [share.probability for share in (self.holds, self.replanned) if share is not None]

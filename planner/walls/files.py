@@ -18,7 +18,7 @@ from hand_models.base import (
     reading_file,
     whole_file,
 )
-from hand_models.fixed_wrist import input_digests
+from hand_models.fixed_wrist import check_made_with, input_digests
 from hand_models.hand import Grasp
 from hand_models.rock import Mesh
 from hand_models.tile import Surface
@@ -87,17 +87,10 @@ def read_wall(path: Path, robot: Robot, rock: Mesh, surface: Surface) -> Wall:
         texts = {name: str(arrays.pop(name, "")) for name in ("format", "about", "digest")}
         if texts["format"] != FILE_FORMAT:
             raise InvalidInputError(f"is not a file of a wall: {path}", field="file")
-        now = _inputs(robot, rock, surface)
-        before = dict(zip(now, arrays["made_with"].tolist(), strict=True))
-        differ = [name for name, digest in now.items() if before[name] != digest]
-        if differ:
-            raise InvalidInputError(
-                f"was made with another {' and another '.join(differ)}: make the wall again: "
-                f"{path}",
-                field="file",
-            )
+        now, again = _inputs(robot, rock, surface), f"make the wall again: {path}"
+        check_made_with(now, arrays["made_with"].tolist(), again)
         if _digest(arrays) != texts["digest"]:
-            raise InvalidInputError(f"is damaged: make the wall again: {path}", field="file")
+            raise InvalidInputError(f"is damaged: {again}", field="file")
         return _wall(arrays, robot, rock, surface)
 
 

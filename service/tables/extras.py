@@ -236,12 +236,9 @@ def print_survival(found: Survival, out: Console) -> None:
     out : Console
         Console to print on.
     """
-    moduli = ", ".join(
-        f"m = {s.modulus:.3g} on {s.surface or 'own surface'} ({s.source})" for s in found.surfaces
-    )
     out.print(
-        f"strengths {found.strength:g} times those assumed, Weibull modulus {moduli}, scatter of "
-        f"holds {found.hold_scatter:g}, of the rock {found.rock_scatter:g}:"
+        f"strengths {found.strength:g} times those assumed, Weibull modulus {found.moduli}, "
+        f"scatter of holds {found.hold_scatter:g}, of the rock {found.rock_scatter:g}:"
     )
     _print_no_slip("no tile and no palm slips", found, found.strength, out)
     if found.reason is not None:
