@@ -111,10 +111,6 @@ class CompliantHand:
     def _batch(self) -> CompliantHands:
         return CompliantHands([self])
 
-    @cached_property
-    def _alone(self) -> list[CompliantFingers]:
-        return [CompliantFingers([finger], self.scheme) for finger in self.fingers]
-
     def _finger(self, i: int, name: str) -> FingerAtRest:
         settled, hand = self.settled, self.settled.hand
         base_tile = name.startswith("outer")
@@ -160,7 +156,8 @@ class CompliantHand:
         """
         x, z, turned, slip = (self._batch.bases[0, :, i] @ _terms(twists))[:, None]
         tension = np.full((1, len(twists)), self.preload[i])
-        return self._alone[i].loads(x, z, turned, tension, slip).of(0)
+        alone = CompliantFingers([self.fingers[i]], self.scheme)
+        return alone.loads(x, z, turned, tension, slip).of(0)
 
     def lateral_loads(self, i: int, twists: Numbers) -> Numbers:
         """Return the lateral loads of one finger's tiles at m twists of the wrist.

@@ -23,9 +23,8 @@ the surface's strength.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Final
 
 import numpy as np
@@ -189,7 +188,7 @@ class TileStrengths:
         factor : float, optional
             c, above 0.
         """
-        return self._no_slip(self.log_hazards(used), math.log(factor))
+        return self._no_slip(self.log_hazards(used))(math.log(factor))
 
     def factor_for(self, used: Array, probability: float) -> float:
         """Return the factor c at which no tile slips with a given probability; 0 without load.
@@ -204,22 +203,33 @@ class TileStrengths:
         hazards = self.log_hazards(used)
         if not np.isfinite(hazards).any():
             return 0.0
+        no_slip = self._no_slip(hazards)
         ends = -STRENGTH_SETTINGS.most_log, STRENGTH_SETTINGS.most_log
 
         def short(log_factor: float) -> float:
-            return self._no_slip(hazards, log_factor) - probability
+            return no_slip(log_factor) - probability
 
         if short(ends[0]) >= 0.0 or short(ends[1]) <= 0.0:
             return math.exp(ends[0] if short(ends[0]) >= 0.0 else ends[1])
         return math.exp(scipy.optimize.brentq(short, *ends, xtol=1e-15, rtol=1e-15))
 
-    def _no_slip(self, log_hazards: Array, log_factor: float) -> float:
-        """Return the probability that no tile slips, by the logarithms of hazards and of c."""
-        (rock, of_rock), (hold, of_hold) = map(_nodes, (self.scatter.rock, self.scatter.hold))
-        logs = rock[:, None, None] + hold[:, None] + log_factor
-        with np.errstate(over="ignore"):
-            held = np.exp(-np.exp(log_hazards - self.modulus * logs))
-        return float(of_rock @ np.prod(np.einsum("klh,l->kh", held, of_hold), axis=1))
+    def _no_slip(self, log_hazards: Array) -> Callable[[float], float]:
+        """Return the probability that no tile slips, as a function of the logarithm of c."""
+        nodes, weights = np.polynomial.hermite_e.hermegauss(STRENGTH_SETTINGS.nodes)
+        weights /= weights.sum()
+        # over the logarithms of factors of mean 1
+        (rock, of_rock), (hold, of_hold) = (
+            (spread * nodes - 0.5 * spread**2, weights) if spread else (np.zeros(1), np.ones(1))
+            for spread in (self.scatter.rock, self.scatter.hold)
+        )
+
+        def probability(log_factor: float) -> float:
+            logs = rock[:, None, None] + hold[:, None] + log_factor
+            with np.errstate(over="ignore"):
+                held = np.exp(-np.exp(log_hazards - self.modulus * logs))
+            return float(of_rock @ np.prod(np.einsum("klh,l->kh", held, of_hold), axis=1))
+
+        return probability
 
     def sample(
         self,
@@ -250,21 +260,3 @@ class TileStrengths:
 def _factors(rng: np.random.Generator, spread: float, shape: tuple[int, int]) -> Array:
     """Return samples of log-normal factors of mean 1."""
     return np.asarray(np.exp(spread * rng.standard_normal(shape) - 0.5 * spread**2))
-
-
-def _nodes(spread: float) -> tuple[Array, Array]:
-    """Return nodes and weights of quadrature over the logarithm of a factor of mean 1."""
-    if spread == 0.0:
-        return np.zeros(1), np.ones(1)
-    nodes, weights = _normal_nodes(STRENGTH_SETTINGS.nodes)
-    return spread * nodes - 0.5 * spread**2, weights
-
-
-@cache
-def _normal_nodes(count: int) -> tuple[Array, Array]:
-    """Return nodes and weights of quadrature over a normal number of mean 0 and deviation 1."""
-    nodes, weights = np.polynomial.hermite_e.hermegauss(count)
-    weights /= weights.sum()
-    for each in (nodes, weights):
-        each.setflags(write=False)
-    return nodes, weights
