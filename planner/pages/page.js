@@ -156,7 +156,7 @@ const axis = (title) => ({ title: { text: title }, color: ink("dim"), gridcolor:
 const vector = (v, length) => Object.fromEntries(["x", "y", "z"].map((c, k) => [c, length * v[k]]));
 function cameraOf(view) { // farther away in a narrow window, and from what is flat
   const { clientWidth, clientHeight } = byId("scene"), sizes = ranges.map(([low, high]) => high - low);
-  const flat = Math.max(...sizes) / Math.cbrt(sizes[0] * sizes[1] * sizes[2]), titles = data.groups ? 1.25 : 1.1;
+  const flat = Math.max(...sizes) / Math.cbrt(sizes[0] * sizes[1] * sizes[2]), titles = data.groups || data.live ? 1.25 : 1.1;
   const far = 1.75 * Math.max(1, flat) * Math.max(1, titles * clientHeight / clientWidth);
   return { eye: vector(view.eye, far), up: vector(view.up, 1), center: vector([0, 0, 0], 0) };
 }
