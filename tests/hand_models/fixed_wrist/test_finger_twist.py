@@ -171,8 +171,8 @@ def test_a_plan_that_it_overloads_names_the_joint(wrist):
 
 
 @pytest.mark.slow
-def test_however_weak_a_joint_compliant_hands_find_their_balance_with_the_same_twist():
-    """A balance knows no limit, and where twist is all that counts, the least is the same."""
+def test_however_weak_a_joint_compliant_hands_find_their_balance_with_much_the_same_twist():
+    """A balance knows no limit, and where twist is all that counts, the least is much the same."""
     asked = question(read_request("boulders"))
     hands = tuple(replace(hand, wrist="compliant") for hand in asked.stance.hands)
     found = []
@@ -182,8 +182,8 @@ def test_however_weak_a_joint_compliant_hands_find_their_balance_with_the_same_t
         assert answer.status == "overloaded"
         assert answer.limiting.limit == FINGER_TWIST
         found.append(answer.utilisation * limit)
-    # searches end at kinks some per cent from the least
-    assert max(found) <= 1.03 * min(found)
+    # searches twenty times beyond the limits end at kinks up to an eighth from the best one
+    assert max(found) <= 1.15 * min(found)
 
 
 def test_the_check_of_plans_knows_it():
