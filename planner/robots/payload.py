@@ -62,8 +62,8 @@ class Payload(Strict, frozen=True):
             raise InvalidFieldError(f"3 finite numbers are needed, got {self.com}", field="com")
         if (self.link is None) == (self.limb is None):
             raise InvalidFieldError(
-                "a payload is on a link or on a limb's hand: give link or limb, and not both; got "
-                f"link {self.link!r} and limb {self.limb!r}",
+                "a payload is on a link or on a limb's hand: give link or limb"
+                + ("; neither is given" if self.link is None else ", and not both"),
                 field="link",
             )
 

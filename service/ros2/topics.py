@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import zenoh
+from msgspec import UNSET
 
 from hand_models.base import CruxError
 from service.replies import PublishedReply
@@ -122,8 +123,9 @@ class RosStream:
             if (error := newest.error) is not None:
                 level, message = 2, f"{error.kind}: {error.field or 'wrench'}: {error.message}"
             elif (points := newest.set_points) is not None:
-                level = 0 if points.status == "optimal" else 1
-                message = points.reason or points.status
+                odd = [] if points.findings is UNSET else points.findings
+                level = 0 if points.status == "optimal" and not odd else 1
+                message = "; ".join([points.reason or points.status, *(f.message for f in odd)])
                 values |= {"utilisation": str(points.utilisation), "gap": str(points.gap)}
         if self._refused:
             level, message = 2, f"the newest wrench is refused: {self._refused}"

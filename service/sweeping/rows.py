@@ -39,6 +39,7 @@ RESULT_COLUMNS: Final = (
     Column("utilisation", "float", "1", "the largest of any limit"),
     Column("load_factor", "float", "1", "inf where there is no end to it"),
     *(Column(part, "text", "", f"{part} of the limit that is used most") for part in LIMIT_PARTS),
+    Column("warnings", "text", "", "with '; ' between them"),
     Column("error", "text", "", "why there is no plan"),
 )
 """Columns of the results, which follow the columns of the variations."""
@@ -61,6 +62,8 @@ class SweepRow(msgspec.Struct, frozen=True):
         True if there is no largest multiple.
     limiting : LimitName or None
         Limit with the largest utilisation.
+    warnings : tuple of str
+        What is odd or unfinished, in sentences; of a row of a file all in one.
     error : ErrorDetail or None
         Why there is no plan.
     cap : float
@@ -73,6 +76,7 @@ class SweepRow(msgspec.Struct, frozen=True):
     load_factor: float | None = None
     load_factor_unbounded: bool = False
     limiting: LimitName | None = None
+    warnings: tuple[str, ...] = ()
     error: ErrorDetail | None = None
     cap: float = 1.0
 
@@ -122,7 +126,8 @@ class SweepRow(msgspec.Struct, frozen=True):
         ]
         factor = "inf" if self.load_factor_unbounded else self.load_factor
         limit = [getattr(self.limiting, part, None) for part in LIMIT_PARTS]
-        return [*point, self.status, self.utilisation, factor, *limit, self.complaint]
+        warnings = "; ".join(self.warnings) or None
+        return [*point, self.status, self.utilisation, factor, *limit, warnings, self.complaint]
 
     @classmethod
     def read(cls, design: Design, point: Point, line: bulk.TableRow) -> SweepRow:
@@ -148,8 +153,9 @@ class SweepRow(msgspec.Struct, frozen=True):
             None if unbounded else factor,
             unbounded,
             msgspec.convert(limit, LimitName) if limit["limit"] else None,
-            line.error,
-            design.cap(point),
+            (known["warnings"],) if known["warnings"] else (),
+            error=line.error,
+            cap=design.cap(point),
         )
 
 

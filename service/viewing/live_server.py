@@ -151,7 +151,7 @@ class _Handler(BaseHTTPRequestHandler):
         if not hmac.compare_digest(token.encode(), self.server.token.encode()):
             raise _RefusedError(
                 HTTPStatus.FORBIDDEN,
-                "the address lacks the token: open the whole address that crux view has printed",
+                "the token is missing or wrong: open the whole address that crux view has printed",
             )
         if not known:
             raise _RefusedError(HTTPStatus.NOT_FOUND, "there is nothing at this address")

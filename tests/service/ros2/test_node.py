@@ -329,9 +329,13 @@ def test_published_wrenches_get_set_points_with_their_stamp(
     # further ones of the first stamp may have come late
     assert all(one["header"]["stamp"] == points["header"]["stamp"] for one in [*got.queue])
 
-    call.publish([math.nan, *first[1:]], stamp + 2)
+    # in kN, as it seems
+    call.publish([1e-3 * entry for entry in first], stamp + 2)
+    assert soon(lambda: "in kN" in state_with(diagnostics, 1, level=1)["message"])
+
+    call.publish([math.nan, *first[1:]], stamp + 3)
     assert state_with(diagnostics, 1, level=2)["message"].startswith("invalid: body_wrench[0]")
-    call.publish(first, stamp + 3, frame="torso")
+    call.publish(first, stamp + 4, frame="torso")
     assert soon(
         lambda: "frame_id 'torso'; valid: 'B'" in state_with(diagnostics, 1, level=2)["message"]
     )

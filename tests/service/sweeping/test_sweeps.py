@@ -150,9 +150,16 @@ def test_the_table_has_units_and_every_point(tmp_path: Path) -> None:
             assert line["limb"] == row.limiting.limb
             assert line["limit"] == row.limiting.limit
             assert line["error"] == ""
+            assert line["warnings"] == "; ".join(row.warnings)
         else:
             assert line["utilisation"] == line["load_factor"] == line["limb"] == ""
             assert line["error"].startswith("invalid: ")
+
+
+def test_a_row_has_the_warnings_of_its_plan() -> None:
+    odd, plain = service.sweep(WALL, ["load.mass=0.11,100"]).rows
+    assert any(each.startswith("load.mass:") for each in odd.warnings)
+    assert not any(each.startswith("load.mass:") for each in plain.warnings)
 
 
 def test_processes_answer_as_this_process_does() -> None:

@@ -282,7 +282,7 @@ INVALID = [
         ("load",),
         {"payloads": [{"mass": 1.0, "limb": "front_left"}, {"mass": 1.0}]},
         "load.payloads[1].link",
-        "give link or limb, and not both",
+        "give link or limb; neither is given",
     ),
     (("limits",), {"tension_change": 9.0}, "limits.tension_change", "requires 'present' tensions"),
     (("present",), {"front_left": [9.0, 9.0, 9.0]}, "present.front_left", "length 4"),
