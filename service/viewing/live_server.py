@@ -9,7 +9,7 @@ from http import HTTPStatus
 from http.client import HTTP_PORT
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs
 
 import msgspec
 
@@ -116,8 +116,8 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         try:
-            path = urlsplit(self.path)
-            self._check(path.path == "/", parse_qs(path.query).get("token", [""])[0])
+            path, _, query = self.path.partition("?")
+            self._check(path == "/", parse_qs(query).get("token", [""])[0])
             self._send(HTTPStatus.OK, self.server.document().encode(), "text/html; charset=utf-8")
         except _RefusedError as error:
             self._refuse(error)

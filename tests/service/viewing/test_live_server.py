@@ -68,7 +68,7 @@ def test_the_page_needs_the_token_and_this_machine_as_its_host(live):
     assert (headers["Referrer-Policy"], headers["Cache-Control"]) == ("no-referrer", "no-store")
     assert server.token not in text
     assert server.address.startswith("http://127.0.0.1:")
-    for path in ("/", "/?token=", f"{page}x", "/?token=%C3%A9%FF"):
+    for path in ("/", "/?token=", f"{page}x", "/?token=%C3%A9%FF", "http://[/"):
         status, _, text = asked(server, "GET", path)
         assert (status, "open the whole address" in text) == (403, True)
     # a name that another site lets point here
