@@ -92,9 +92,8 @@ class RosStream:
         except CruxError as error:
             self._refused = str(error)
             return
-        frame, stamp = given.header.frame_id, given.header.stamp
-        self._refused = f"frame_id {frame!r}; valid: 'B', or none" if frame not in ("", "B") else ""
-        stream = self._stream
+        self._refused = _refusal(given.header)
+        stream, stamp = self._stream, given.header.stamp
         if not stream or self._refused:
             return
         number = stamp.sec * 10**9 + stamp.nanosec or time.time_ns()
@@ -142,3 +141,15 @@ class RosStream:
         with self._lock:
             if reply.stream == self._stream:
                 self._newest, self._sent = reply, self._sent + (found is not None)
+
+
+def _refusal(header: Any) -> str:
+    """Return why a wrench with this header is refused; empty where it is not."""
+    frame, stamp = header.frame_id, header.stamp
+    if frame not in ("", "B"):
+        return f"frame_id {frame[:20]!r}; valid: 'B', or none"
+    if stamp.sec < 0 or stamp.nanosec >= 10**9:
+        return (
+            f"stamp of {stamp.sec} s and {stamp.nanosec} ns; valid: 0 or more, and less than 1e9 ns"
+        )
+    return ""
