@@ -158,7 +158,7 @@ class MovableStance:
         depth = hold.entry(point, axes[:, 2])
         if not math.isfinite(depth):
             raise InvalidInputError(
-                f"{hand.limb}: there is no rock {1e3 * x:.0f} mm along x and {1e3 * y:.0f} mm along"
+                f"there is no rock {1e3 * x:.0f} mm along x and {1e3 * y:.0f} mm along"
                 " y of where the stance has it; move it back",
                 field=f"hands.{hand.limb}",
             )
