@@ -104,10 +104,11 @@ class LivePlan:
         Raises
         ------
         InvalidInputError
-            If there is no such stance, or the file cannot be written.
+            If the moved stance is impossible, or the file cannot be written.
         """
         text, before, files = self._given
         moved = self._stance.moved(moves)
+        answering.question(moved, self._stance.robots)  # refuses what could not be read again
         if files is not None:
             moved = files.named(moved, before, self._file.parent)
         content = msgspec.json.format(answering.rewritten(text, before, moved))

@@ -142,6 +142,18 @@ def test_a_moved_stance_is_planned_and_saved_as_crux_plan_has_it(live):
     assert back["utilisation"] == unmoved.utilisation
 
 
+def test_an_impossible_stance_does_not_replace_what_is_saved(live):
+    server, file = live
+    answer(server, "/save", moves={})
+    kept = file.read_bytes()
+    for moves, field in (
+        ({"body": [0.0, 0.0, 50.0]}, "stance.hands[0].pose.position: "),
+        ({"hands": {"front_left": [5.0, 0.0]}}, "hands.front_left: there is no rock 5000 mm"),
+    ):
+        assert answer(server, "/save", moves=moves)["error"].startswith(field)
+        assert file.read_bytes() == kept
+
+
 def test_what_goes_wrong_is_said(live, monkeypatch, capfd):
     server, file = live
 
