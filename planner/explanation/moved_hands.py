@@ -40,7 +40,8 @@ def changed_contacts(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Ite
     asked = []
     for _, twist, settled, place in moved:
         there = Pose(twist[:3], turns_about(twist[3:])).inverse() @ settled.seating.pose
-        asked.append(replace(place, hold_pose=None, hold_in_hand=there))
+        seated = replace(place, at=None, seat="rest", seat_direction=None)
+        asked.append(replace(seated, hold_pose=None, hold_in_hand=there))
     closed = settle_each(stance.robot.hand, asked) if asked else []
     for (hand, twist, settled, _), again in zip(moved, closed, strict=True):
         if isinstance(again, InvalidInputError):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from msgspec import UNSET, structs
 
+from hand_models.base import Pose
 from hand_models.compliance import CompliantHand, FloatingWrist
 from hand_models.parameters import own_draw, own_hand
 from hand_models.tendon import share_load
@@ -212,3 +213,15 @@ def test_fixed_hands_have_no_stretch_and_floating_ones_do():
     for hand, sent in zip(answer.hands, reply.hands, strict=True):
         expected = UNSET if hand.wrist is None else hand.wrist.stretches.max()
         assert sent.wrist.largest_stretch == expected
+
+
+@pytest.mark.parametrize("seated", [{"seat": "best"}, {"at": Pose.identity()}])
+def test_hands_that_are_seated_are_compared_with_those_where_their_wrists_go(seated):
+    """Here on the crests of their holds: the plan and what it says are as without a seat."""
+    plain = moving("wall-300")
+    hands = tuple(replace(hand, **seated) for hand in plain.stance.hands)
+    one, two = plan(plain), plan(replace(plain, stance=replace(plain.stance, hands=hands)))
+    assert two.verified
+    assert two.utilisation == pytest.approx(one.utilisation, rel=1e-5)
+    assert two.warnings == one.warnings
+    assert all(hand.wrist.driven for hand in two.hands)
