@@ -73,6 +73,7 @@ class LiveServer(ThreadingHTTPServer):
     """
 
     daemon_threads = True
+    request_queue_size = VIEWING_SETTINGS.most_waiting
 
     def __init__(self, plan: LivePlan, port: int, streams: FollowedStreams | None = None) -> None:
         super().__init__(("127.0.0.1", port), _Handler)

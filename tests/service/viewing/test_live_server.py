@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.client
 import json
+import socket
 import threading
 
 import msgspec
@@ -76,6 +78,14 @@ def test_the_page_needs_the_token_and_this_machine_as_its_host(live):
         status, _, text = asked(server, "GET", page, Host=host)
         assert (status, "crux view has printed" in text) == (403, True)
     assert asked(server, "GET", f"/elsewhere?token={server.token}")[0] == 404
+
+
+def test_many_connections_at_once_are_kept():
+    """Before any is accepted: what is not kept is not connected."""
+    with LiveServer(None, 0) as server, contextlib.ExitStack() as connected:
+        for _ in range(60):
+            address = ("127.0.0.1", server.server_port)
+            connected.enter_context(socket.create_connection(address, timeout=5.0))
 
 
 def test_questions_need_the_token_and_the_pages_own_origin(live):
