@@ -142,7 +142,7 @@ def _add_page(session: zenoh.Session, key: _Key, pages: dict[str, bytes]) -> Non
         asked = coder.encode(example)
         told = _ask(session, key.name, asked, encoding)
         if not told.good:
-            raise RuntimeError(f"{key.name}: {told.payload.decode()}")
+            raise RuntimeError(f"{key.name}: {told.payload!r}")
         both = {"request": _Told(asked, encoding, True), "reply": told}
         text += _payloads(key.name, form, both, pages)
     pages[f"keys/{key.name}.md"] = "\n".join(text).encode()
