@@ -7,8 +7,9 @@ import json
 import os
 import shutil
 import subprocess
-import time
 from base64 import b64decode
+
+from tests.suite.helpers.patience import soon
 
 PROGRAM = shutil.which("chromium") or shutil.which("google-chrome")
 FLAGS = ["--headless", "--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader"]
@@ -100,12 +101,9 @@ class Browser:
         assert "exceptionDetails" not in found, found
         return found["result"].get("value")
 
-    def until(self, script, seconds=120.0):
+    def until(self, script):
         """Wait until an expression is true."""
-        end = time.monotonic() + seconds
-        while not self.run(script):
-            assert time.monotonic() < end, script
-            time.sleep(0.02)
+        assert soon(lambda: self.run(script)), script
 
     def mouse(self, kind, x, y, *, held=True):
         """Send a mouse event: mousePressed, mouseMoved or mouseReleased."""
