@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from msgspec import structs
+from scipy.spatial.transform import Rotation
 
 import planner
 from hand_models.base import (
@@ -17,7 +18,6 @@ from hand_models.base import (
     Pose,
     Position,
     Strict,
-    turns_about,
 )
 from hand_models.rock import Hold
 from service import answering, requests
@@ -165,7 +165,8 @@ class MovableStance:
         there = Pose(point + depth * axes[:, 2], axes)
         before, after = _inward(hold, frame), _inward(hold, there)
         if before is not None and after is not None:
-            axes = _turn(before, after) @ axes
+            # by the least turn
+            axes = Rotation.align_vectors(after, before)[0].as_matrix() @ axes
         up, _, approach = (rock.rotation @ axes).T.tolist()
         fields: dict[str, Any] = {"pose": None, "contact_offset": None}
         if hand.place is None:
@@ -192,11 +193,3 @@ def _inward(hold: Hold, frame: Pose) -> Array | None:
     slope = (depths[[0, 2]] - depths[[1, 3]]) / (2.0 * half)
     inward = frame.rotation @ [*-slope, 1.0]
     return np.asarray(inward / np.linalg.norm(inward))
-
-
-def _turn(before: Array, after: Array) -> Array:
-    """Return the least rotation matrix that takes one unit vector to another."""
-    axis = np.cross(before, after)
-    sine = float(np.linalg.norm(axis))
-    angle = math.atan2(sine, float(before @ after))
-    return turns_about(axis * (angle / sine if sine else 0.0))
