@@ -141,11 +141,11 @@ def serve_command(
             gc.freeze()
             node = service.ros
             if as_json:
-                own_names = {} if node is None else {"ros2": (*node.services, *node.topics)}
+                own_names = {} if node is None else {"ros2": node.names}
                 tables.say({"v": 1, "keys": service.keys, "listen": endpoints} | own_names)
             tables.remark(f"ready; serving {', '.join(service.keys)}")
             if node is not None:
-                tables.remark(f"in ROS 2: {', '.join((*node.services, *node.topics))}")
+                tables.remark(f"in ROS 2: {', '.join(node.names)}")
             if open_to := serving.exposed(config):
                 tables.note(
                     f"{', '.join(open_to)}: whoever reaches it can ask, and read what zenoh "

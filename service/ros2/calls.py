@@ -1,7 +1,8 @@
-"""Answer calls of ROS 2 services by crux's own questions."""
+"""Answer calls of ROS 2 services, and the node's own questions, by crux's own services."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, Self
 
@@ -10,72 +11,31 @@ import zenoh
 from hand_models.base import CruxError
 from service.answering import SERVICES_BY_NAME
 from service.replies import ErrorReply
-from service.ros2.messages import RosMessages
+from service.ros2.definitions import RosTypes
+from service.ros2.messages import AnyReply, RosMessages, read_answer
 from service.ros2.names import Attachment, Endpoint
 from service.wire import Format, ServiceName, check_size, encode_error
 
-__all__ = ["RosCall"]
+__all__ = ["OwnQuestion", "RosCall", "RosQuestion", "ServiceCall"]
 
 
-class RosCall:
-    """Call of a ROS 2 service, with the face of a zenoh query for crux.
+class RosQuestion(ABC):
+    """Question for a caller by ROS 2, with the face of a zenoh query for crux.
 
-    The reply to it, or the error, becomes the response of the service: to ROS 2, an error reply of
-    zenoh is no reply. Use it in a ``with`` block, which ends the query.
+    Use it in a ``with`` block, which ends the query.
 
-    Parameters
+    Attributes
     ----------
-    query : zenoh.Query
-        Query by which ROS 2 calls.
-    key : str
-        Key of the service.
-    service : Endpoint
-        The service that is called.
-    messages : RosMessages
-    answered : callable
-        Called with the response to a request that is answered, before it is sent.
-
-    Raises
-    ------
-    InvalidInputError
-        If the query has not the attachment of ROS 2.
+    caller : bytes
+        Global identifier of the caller, 16 bytes.
     """
 
-    def __init__(
-        self,
-        query: zenoh.Query,
-        key: str,
-        service: Endpoint,
-        messages: RosMessages,
-        answered: Callable[[Any], None],
-    ) -> None:
-        self._query, self._key, self._service, self._messages = query, key, service, messages
-        self._answered = answered
-        given = query.attachment
-        self._attached = Attachment.read(b"" if given is None else given.to_bytes())
-        self._payload = zenoh.ZBytes(b"")
-
-    def read(self, name: ServiceName) -> None:
-        """Read the request of the service, as crux's request of a kind.
-
-        Raises
-        ------
-        LimitError
-            If the request has too many bytes for its kind.
-        MalformedError
-            If the request is not of the service's type.
-        """
-        given = self._query.payload
-        if given is None:
-            given = zenoh.ZBytes(b"")
-        check_size(len(given), SERVICES_BY_NAME[name].request)
-        request = self._messages.types.decode(given.to_bytes(), f"{self._service.type}_Request")
-        self._payload = zenoh.ZBytes(self._messages.request(name, request))
+    caller: bytes
 
     @property
+    @abstractmethod
     def payload(self) -> zenoh.ZBytes:
-        """The request of crux, in JSON; empty before it is read."""
-        return self._payload
+        """The request of crux, in JSON."""
 
     @property
     def encoding(self) -> zenoh.Encoding:
@@ -89,44 +49,196 @@ class RosCall:
 
     @property
     def source_info(self) -> zenoh.SourceInfo | None:
-        """Identifier of the client's session, as of the query."""
-        return self._query.source_info
+        """Identifier of the client's session: callers by ROS 2 have one of their own."""
+        return None
 
+    @abstractmethod
     def reply(self, key: str, payload: bytes, *, encoding: str) -> None:
-        """Send a reply as the response of the service.
+        """Take a reply, in JSON.
 
         Parameters
         ----------
         key : str
-            Key of crux's own service, which is not that of the response.
+            Key of crux's own service.
         payload : bytes
             Encoded reply, in JSON.
         encoding : str
             Zenoh encoding of the payload.
         """
-        response = self._messages.response(f"{self._service.type}_Response", payload)
-        self._answered(response)
-        self._send(response)
+
+    @abstractmethod
+    def reply_err(self, payload: bytes, *, encoding: str) -> None:
+        """Take an encoded `ErrorReply`."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    @abstractmethod
+    def __exit__(self, *_: object) -> None: ...
+
+
+class OwnQuestion(RosQuestion):
+    """Question that the node asks by itself, for a caller by ROS 2.
+
+    Parameters
+    ----------
+    caller : bytes
+        Global identifier of the caller, 16 bytes.
+    request : bytes
+        The request of crux, in JSON.
+    replied : callable
+        Called with each reply in JSON, and its zenoh encoding.
+    refused : callable
+        Called with the error, if there is one.
+    """
+
+    def __init__(
+        self,
+        caller: bytes,
+        request: bytes,
+        replied: Callable[[bytes, str], None],
+        refused: Callable[[ErrorReply], None],
+    ) -> None:
+        self.caller, self._payload = caller, zenoh.ZBytes(request)
+        self._replied, self._refused = replied, refused
+
+    @property
+    def payload(self) -> zenoh.ZBytes:
+        return self._payload
+
+    def reply(self, key: str, payload: bytes, *, encoding: str) -> None:
+        self._replied(payload, encoding)
+
+    def reply_err(self, payload: bytes, *, encoding: str) -> None:
+        self._refused(Format.named(encoding).decode(payload, ErrorReply))
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
+class ServiceCall:
+    """Call of a service of ROS 2, to be answered by one response.
+
+    Parameters
+    ----------
+    query : zenoh.Query
+        Query by which ROS 2 calls.
+    key : str
+        Key of the service.
+    service : Endpoint
+        The service that is called.
+    types : RosTypes
+
+    Attributes
+    ----------
+    caller : bytes
+        Global identifier of the caller, 16 bytes.
+
+    Raises
+    ------
+    InvalidInputError
+        If the query has not the attachment of ROS 2.
+    """
+
+    def __init__(self, query: zenoh.Query, key: str, service: Endpoint, types: RosTypes) -> None:
+        self._query, self._key, self.service, self._types = query, key, service, types
+        given = query.attachment
+        attached = Attachment.read(b"" if given is None else given.to_bytes())
+        self._number, self.caller = attached.number, attached.sender
+
+    def read(self, kind: type) -> Any:
+        """Return the request.
+
+        Parameters
+        ----------
+        kind : type
+            Request of crux in it, which limits its bytes.
+
+        Raises
+        ------
+        LimitError
+            If the request has too many bytes.
+        MalformedError
+            If the request is not of the service's type.
+        """
+        given = self._query.payload
+        data = b"" if given is None else given
+        check_size(len(data), kind)
+        return self._types.decode(bytes(data), f"{self.service.type}_Request")
+
+    def respond(self, response: Any) -> None:
+        """Send the response."""
+        # whose request it answers
+        attached = Attachment.sent_now(self._number, self.caller)
+        self._query.reply(self._key, self._types.encode(response), attachment=attached.encode())
+
+    def end(self) -> None:
+        """End the query, which has then no further response."""
+        self._query.drop()
+
+
+class RosCall(RosQuestion):
+    """Call of a ROS 2 service.
+
+    The reply to it, or the error, becomes the response of the service: to ROS 2, an error reply of
+    zenoh is no reply.
+
+    Parameters
+    ----------
+    call : ServiceCall
+    messages : RosMessages
+    prepare : callable
+        Called with the request of crux, in JSON; returns it as it is to be asked.
+    answered : callable
+        Called with the call and its reply, a typed message of crux, before the response is sent.
+    """
+
+    def __init__(
+        self,
+        call: ServiceCall,
+        messages: RosMessages,
+        prepare: Callable[[bytes], bytes],
+        answered: Callable[[RosCall, AnyReply], None],
+    ) -> None:
+        self._call, self._messages = call, messages
+        self._prepare, self._answered = prepare, answered
+        self.caller = call.caller
+        self._response = f"{call.service.type}_Response"
+        self._payload = zenoh.ZBytes(b"")
+
+    def read(self, name: ServiceName) -> None:
+        """Read the request of the service, as crux's request of a kind.
+
+        Raises
+        ------
+        LimitError
+            If the request has too many bytes for its kind.
+        MalformedError
+            If the request is not of the service's type.
+        """
+        request = self._call.read(SERVICES_BY_NAME[name].request)
+        self._payload = zenoh.ZBytes(self._prepare(self._messages.request(name, request)))
+
+    @property
+    def payload(self) -> zenoh.ZBytes:
+        """The request of crux, in JSON; empty before it is read."""
+        return self._payload
+
+    def reply(self, key: str, payload: bytes, *, encoding: str) -> None:
+        """Send a reply as the response of the service; parameters as of `RosQuestion.reply`."""
+        reply = read_answer(payload, encoding)
+        self._answered(self, reply)
+        self._call.respond(self._messages.response(self._response, reply, payload.decode()))
 
     def reply_err(self, payload: bytes, *, encoding: str) -> None:
         """Send an encoded `ErrorReply` as the response of the service."""
         error = Format.named(encoding).decode(payload, ErrorReply)
-        self._send(self._messages.refusal(f"{self._service.type}_Response", error))
+        self._call.respond(self._messages.refusal(self._response, error))
 
     def refuse(self, error: CruxError) -> None:
         """Send an error as the response of the service."""
         answer = encode_error(error, Format.JSON)
         self.reply_err(answer.payload, encoding=answer.encoding)
 
-    def _send(self, response: Any) -> None:
-        # whose request it answers
-        attached = Attachment.sent_now(self._attached.number, self._attached.sender)
-        self._query.reply(
-            self._key, self._messages.types.encode(response), attachment=attached.encode()
-        )
-
-    def __enter__(self) -> Self:
-        return self
-
     def __exit__(self, *_: object) -> None:
-        self._query.drop()
+        self._call.end()

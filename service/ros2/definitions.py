@@ -1,4 +1,4 @@
-"""Know the ROS 2 types of services and topics: their CDR encoding and their hashes.
+"""Know the ROS 2 types of services, topics and actions: their CDR encoding and their hashes.
 
 ``crux_msgs`` beside this module is the ROS 2 package of the services' types. Types of others are
 those of rosbags.
@@ -10,13 +10,15 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from hand_models.base import InvalidInputError, to_install
 from service.wire import MalformedError
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
-__all__ = ["RosTypes", "package_folder", "service_definitions"]
+__all__ = ["RosTypes", "action_definitions", "package_folder", "service_definitions"]
 
 
 def package_folder() -> Path:
@@ -42,7 +44,6 @@ def service_definitions(name: str, request: str, response: str) -> dict[str, Any
         Definitions for `rosbags.typesys.store.Typestore`, by type.
     """
     from rosbags.interfaces import Nodetype
-    from rosbags.typesys import get_types_from_msg
 
     # rosbags takes the fixed array of this type for characters, which have another hash
     info = "service_msgs/msg/ServiceEventInfo"
@@ -50,11 +51,8 @@ def service_definitions(name: str, request: str, response: str) -> dict[str, Any
         "uint8 event_type\nbuiltin_interfaces/Time stamp\nuint8[16] client_gid\n"
         "int64 sequence_number"
     )
-    found: dict[str, Any] = dict(get_types_from_msg(event, info))
     parts = {f"{name}_Request": request, f"{name}_Response": response}
-    for part, text in parts.items():
-        # whatever is asked for, rosbags names it a message
-        (found[part],) = get_types_from_msg(text, part.replace("/srv/", "/msg/")).values()
+    found = _messages({info: event, **parts})
     asked, answered = ((Nodetype.NAME, part) for part in parts)
     found[f"{name}_Event"] = (
         [],
@@ -75,11 +73,68 @@ def service_definitions(name: str, request: str, response: str) -> dict[str, Any
     return found
 
 
+def action_definitions(name: str, goal: str, result: str, feedback: str) -> dict[str, Any]:
+    """Return the definitions of what a ROS 2 action has: two services, and its feedback.
+
+    What cancels goals, and their status, is the same for all actions.
+
+    Parameters
+    ----------
+    name : str
+        Type of the action, such as ``crux_msgs/action/Climb``.
+    goal, result, feedback : str
+        Fields, as of the three parts of an ``.action`` file.
+
+    Returns
+    -------
+    dict of str to Any
+        Definitions for `rosbags.typesys.store.Typestore`, by type.
+    """
+    goal_id = "unique_identifier_msgs/UUID goal_id\n"
+    return (
+        _messages(
+            {
+                f"{name}_Goal": goal,
+                f"{name}_Result": result,
+                f"{name}_Feedback": feedback,
+                f"{name}_FeedbackMessage": f"{goal_id}{name}_Feedback feedback",
+            }
+        )
+        | service_definitions(
+            f"{name}_SendGoal",
+            f"{goal_id}{name}_Goal goal",
+            "bool accepted\nbuiltin_interfaces/Time stamp",
+        )
+        | service_definitions(f"{name}_GetResult", goal_id, f"int8 status\n{name}_Result result")
+    )
+
+
+def _messages(texts: dict[str, str]) -> dict[str, Any]:
+    """Return the definition of each message of the given fields."""
+    from rosbags.typesys import get_types_from_msg
+
+    found = {}
+    for name, text in texts.items():
+        package, _, last = name.split("/")
+        # whatever is asked for, rosbags names it a message
+        (found[name],) = get_types_from_msg(text, f"{package}/msg/{last}").values()
+    return found
+
+
+def _dtype(name: str) -> str:
+    return "uint8" if name in ("octet", "byte", "char") else name
+
+
 class RosTypes:
     """Types of ROS 2 messages and services, with those of ``crux_msgs``.
 
     The types of others are those of ROS 2 Jazzy; those that a service uses are the same from Iron
     to Lyrical.
+
+    Parameters
+    ----------
+    more : dict of str to Any, optional
+        Definitions of further types, by type.
 
     Raises
     ------
@@ -87,25 +142,31 @@ class RosTypes:
         If rosbags is not installed.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, more: dict[str, Any] | None = None) -> None:
         try:
-            from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+            from rosbags.typesys import Stores, get_typestore
         except ImportError:
             raise InvalidInputError(
                 f"needs rosbags, which is not installed: {to_install('ros2')}", field="--ros2"
             ) from None
         self._store: Typestore = get_typestore(Stores.ROS2_JAZZY)
-        definitions: dict[str, Any] = {}
+        definitions = service_definitions(
+            "action_msgs/srv/CancelGoal",
+            "action_msgs/GoalInfo goal_info",
+            "int8 return_code\naction_msgs/GoalInfo[] goals_canceling",
+        )
         for file in sorted(package_folder().glob("*/*.*")):
-            text, name = file.read_text("utf-8"), f"crux_msgs/{file.parent.name}/{file.stem}"
+            name = f"crux_msgs/{file.parent.name}/{file.stem}"
+            parts = file.read_text("utf-8").split("\n---\n")
             if file.suffix == ".msg":
-                definitions |= get_types_from_msg(text, name)
+                definitions |= _messages({name: parts[0]})
+            elif file.suffix == ".srv":
+                definitions |= service_definitions(name, *parts)
             else:
-                request, _, response = text.partition("\n---\n")
-                definitions |= service_definitions(name, request, response)
+                definitions |= action_definitions(name, *parts)
         # the event's is not rosbags' own, and is hashed only
         del self._store.fielddefs["service_msgs/msg/ServiceEventInfo"]
-        self._store.register(definitions)
+        self._store.register(definitions | (more or {}))
         self.type_hash = cache(self._store.hash_rihs01)
 
     def fields(self, name: str) -> list[str]:
@@ -113,11 +174,30 @@ class RosTypes:
         return [field for field, _ in self._store.fielddefs[name][1]]
 
     def make(self, name: str, /, **fields: Any) -> Any:
-        """Return a message of a type from all of its fields, by name.
+        """Return a message of a type from its fields, by name; those left out are zero or empty.
 
         Sequences of numbers are NumPy arrays; others are lists.
         """
-        return self._store.types[name](**fields)
+        left = {
+            field: self._blank(kind, of)
+            for field, (kind, of) in self._store.fielddefs[name][1]
+            if field not in fields
+        }
+        return self._store.types[name](**fields, **left)
+
+    def _blank(self, kind: Any, of: Any) -> Any:
+        """Return the zero or empty value of a field; kind and further words as rosbags has them."""
+        from rosbags.interfaces import Nodetype
+
+        if kind is Nodetype.NAME:
+            return self.make(of)
+        if kind is Nodetype.BASE:
+            return "" if of[0] == "string" else np.zeros((), _dtype(of[0])).item()
+        (inner, element), size = of
+        if inner is Nodetype.BASE and element[0] != "string":
+            count = size if kind is Nodetype.ARRAY else 0
+            return np.zeros(count, _dtype(element[0]))
+        return []
 
     def encode(self, message: Any) -> bytes:
         """Encode a message as CDR, little endian."""

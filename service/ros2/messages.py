@@ -4,55 +4,44 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, get_args
 
 import msgspec
 import numpy as np
+from msgspec import UNSET
 
 from hand_models.hand import FINGERS
-from service.replies import ErrorReply, PublishedReply
+from planner import LostTile
+from service.replies import (
+    BriefPlanReply,
+    ErrorReply,
+    HandReply,
+    HandSetPoints,
+    PlanReply,
+    PublishedReply,
+    SetPointsReply,
+    StreamReply,
+    Vector,
+    WrenchSpaceReply,
+)
 from service.ros2.definitions import RosTypes
 from service.ros2.health import DiagnosticState
-from service.wire import ServiceName
+from service.wire import Format, MalformedError, ServiceName
 
-__all__ = ["RosMessages", "wrench_entries"]
+__all__ = ["AnyReply", "RosMessages", "number", "read_answer", "wrench_entries"]
 
-
-class _Finger(msgspec.Struct):
-    name: str
-    tendon_tension: float
-    winch_angle: float
+AnyReply = PlanReply | BriefPlanReply | WrenchSpaceReply | StreamReply | SetPointsReply
+"""Reply of crux to one of the services of ROS 2."""
 
 
-class _Hand(msgspec.Struct):
-    """Fields of a hand in replies: those of a plan have fingers, set-points four tensions."""
-
-    limb: str
-    fingers: list[_Finger] = []
-    tensions: list[float] = []
-    winch_angle: list[float] = []
-    wrench: list[float] | None = None
-
-    def drives(self) -> list[tuple[str, float, float]]:
-        """Return name, tension [N] and winch angle [rad] of each tendon."""
-        fingers = self.fingers or [
-            _Finger(*each) for each in zip(FINGERS, self.tensions, self.winch_angle, strict=False)
-        ]
-        return [(f"{self.limb}/{f.name}", f.tendon_tension, f.winch_angle) for f in fingers]
-
-
-class _Read(msgspec.Struct):
-    """Fields of replies that responses of ROS 2 services have; each kind has some of them."""
-
-    stream: str = ""
-    status: str = ""
-    verified: bool = False
-    utilisation: float | None = None
-    load_factor: float | None = None
-    gap: float | None = None
-    hands: list[_Hand] | None = None
-    vertices: list[list[float]] | None = None
+def read_answer(payload: bytes, encoding: str) -> AnyReply:
+    """Decode a reply of crux, of the type that its zenoh encoding names."""
+    kinds: tuple[type[AnyReply], ...] = get_args(AnyReply)
+    for kind in kinds:
+        if Format.is_labelled(encoding, kind):
+            return Format.named(encoding).decode(payload, kind)
+    raise MalformedError(f"a reply {encoding!r} answers no service of ROS 2")
 
 
 class RosMessages:
@@ -91,41 +80,47 @@ class RosMessages:
         }
         return msgspec.json.encode(question)
 
-    def response(self, kind: str, reply: bytes) -> Any:
-        """Return crux's reply, in JSON, as the response of a ROS 2 service.
+    def response(self, kind: str, reply: AnyReply, text: str) -> Any:
+        """Return crux's reply as the response of a ROS 2 service.
 
         Parameters
         ----------
         kind : str
             Type of the response, such as ``crux_msgs/srv/Plan_Response``.
-        reply : bytes
+        reply : AnyReply
+        text : str
+            The reply in JSON.
         """
-        read = msgspec.json.decode(reply, type=_Read)
-        hands = (read.hands if read.verified else None) or []
-        return self._response(kind, self._error(), read, hands, reply.decode())
+        now = time.time_ns()
+        values: dict[str, Any] = {"reply": text}
+        hands: Sequence[HandReply | HandSetPoints] | None = None
+        if isinstance(reply, WrenchSpaceReply):
+            values["vertices"] = [self.wrench(each) for each in reply.vertices or []]
+        else:
+            values |= {"status": reply.status, "utilisation": number(reply.utilisation)}
+        if isinstance(reply, PlanReply | BriefPlanReply):
+            factor = None if reply.load_factor is UNSET else reply.load_factor
+            values |= {"verified": reply.verified, "load_factor": number(factor)}
+            hands = reply.hands if reply.verified else None
+        elif isinstance(reply, SetPointsReply):
+            values |= {"verified": reply.verified, "gap": number(reply.gap)}
+            hands = reply.hands if reply.verified else None
+        elif isinstance(reply, StreamReply):
+            values |= {"stream": reply.stream, "gap": number(reply.gap)}
+        points, wrenches = self._joints(hands or [], now), self._wrenches(hands or [], now)
+        values |= {"set_points": points, "wrenches": wrenches}
+        return self._response(kind, values)
 
     def refusal(self, kind: str, error: ErrorReply) -> Any:
         """Return crux's error as the response of a ROS 2 service; parameters as `response`."""
-        return self._response(kind, self._error(error), _Read(), [], "")
+        return self._response(kind, {"error": self.error(error)})
 
-    def _response(
-        self, kind: str, error: Any, read: _Read, hands: Sequence[_Hand], reply: str
-    ) -> Any:
-        now = time.time_ns()
-        values = {
-            "error": error,
-            "stream": read.stream,
-            "status": read.status,
-            "verified": read.verified,
-            "utilisation": _number(read.utilisation),
-            "load_factor": _number(read.load_factor),
-            "gap": _number(read.gap),
-            "set_points": self._joints(hands, now),
-            "wrenches": self._wrenches(hands, now),
-            "vertices": [self.wrench(each) for each in read.vertices or []],
-            "reply": reply,
-        }
-        return self.types.make(kind, **{name: values[name] for name in self.types.fields(kind)})
+    def _response(self, kind: str, values: dict[str, Any]) -> Any:
+        """Return a response with those of the values that it has; numbers left out are NaN."""
+        numbers = dict.fromkeys(("utilisation", "load_factor", "gap"), math.nan)
+        fields = self.types.fields(kind)
+        known = {name: value for name, value in (numbers | values).items() if name in fields}
+        return self.types.make(kind, **known)
 
     def set_points(self, published: PublishedReply) -> tuple[Any, list[Any]] | None:
         """Return published set-points as ROS 2's messages; None where there are none.
@@ -144,15 +139,7 @@ class RosMessages:
         points, number = published.set_points, published.number
         if points is None or not points.verified or points.status != "optimal" or number is None:
             return None
-        hands = [
-            _Hand(
-                hand.limb,
-                tensions=hand.tensions,
-                winch_angle=hand.winch_angle,
-                wrench=None if hand.wrench is msgspec.UNSET else hand.wrench,
-            )
-            for hand in points.hands or []
-        ]
+        hands = points.hands or []
         return self._joints(hands, number), self._wrenches(hands, number)
 
     def diagnostics(self, states: Sequence[DiagnosticState]) -> Any:
@@ -160,7 +147,7 @@ class RosMessages:
         status, pair = "diagnostic_msgs/msg/DiagnosticStatus", "diagnostic_msgs/msg/KeyValue"
         return self.types.make(
             "diagnostic_msgs/msg/DiagnosticArray",
-            header=self._header("", time.time_ns()),
+            header=self.header("", time.time_ns()),
             status=[
                 self.types.make(
                     status,
@@ -183,42 +170,76 @@ class RosMessages:
         )
         return self.types.make("geometry_msgs/msg/Wrench", force=force, torque=moment)
 
-    def _wrenches(self, hands: Sequence[_Hand], stamp: int) -> list[Any]:
+    def _wrenches(self, hands: Sequence[HandReply | HandSetPoints], stamp: int) -> list[Any]:
         """Return the wrenches of the rock on the hands, which are minus the hands' own."""
         return [
             self.types.make(
                 "geometry_msgs/msg/WrenchStamped",
-                header=self._header(f"{hand.limb}/H", stamp),
+                header=self.header(f"{hand.limb}/H", stamp),
                 wrench=self.wrench([-entry for entry in hand.wrench]),
             )
             for hand in hands
-            if hand.wrench is not None
+            if hand.wrench is not UNSET
         ]
 
-    def _joints(self, hands: Sequence[_Hand], stamp: int) -> Any:
-        drives = [drive for hand in hands for drive in hand.drives()]
+    def _joints(self, hands: Sequence[HandReply | HandSetPoints], stamp: int) -> Any:
+        tensions = {hand.limb: _tensions(hand) for hand in hands}
+        return self.tendons(tensions, stamp, [angle for hand in hands for angle in _angles(hand)])
+
+    def tendons(
+        self, tensions: Mapping[str, Vector], stamp: int, angles: Sequence[float] = ()
+    ) -> Any:
+        """Return tensions of the tendons by limb as ``sensor_msgs/msg/JointState``.
+
+        Parameters
+        ----------
+        tensions : dict of str to sequence of float
+            Of the four tendons, by limb [N].
+        stamp : int
+            Unix time [ns].
+        angles : sequence of float, optional
+            Angle of each winch [rad].
+        """
         return self.types.make(
             "sensor_msgs/msg/JointState",
-            header=self._header("", stamp),
-            name=[name for name, _, _ in drives],
-            position=np.array([angle for _, _, angle in drives]),
-            velocity=np.array([]),
-            effort=np.array([tension for _, tension, _ in drives]),
+            header=self.header("", stamp),
+            name=[f"{limb}/{finger}" for limb in tensions for finger in FINGERS],
+            position=np.array(angles, float),
+            effort=np.array([each for four in tensions.values() for each in four]),
         )
 
-    def _header(self, frame: str, stamp: int) -> Any:
+    def joints(self, angles: Mapping[str, Vector], stamp: int) -> Any:
+        """Return joint angles by limb as ``sensor_msgs/msg/JointState``; parameters as `tendons`.
+
+        Joints are named ``<limb>/joint_<n>``, numbered from 1, from the body outward.
+        """
+        return self.types.make(
+            "sensor_msgs/msg/JointState",
+            header=self.header("", stamp),
+            name=[
+                f"{limb}/joint_{i + 1}" for limb, each in angles.items() for i in range(len(each))
+            ],
+            position=np.array([angle for each in angles.values() for angle in each]),
+        )
+
+    def tile(self, lost: LostTile) -> Any:
+        """Return a tile as ``crux_msgs/msg/Tile``."""
+        return self.types.make(
+            "crux_msgs/msg/Tile", limb=lost.limb, finger=lost.finger, phalanx=lost.phalanx
+        )
+
+    def header(self, frame: str, stamp: int) -> Any:
+        """Return ``std_msgs/msg/Header`` with a frame and a Unix time [ns]."""
         seconds, rest = divmod(stamp, 10**9)
         at = self.types.make("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest)
         return self.types.make("std_msgs/msg/Header", stamp=at, frame_id=frame)
 
-    def _error(self, reply: ErrorReply | None = None) -> Any:
-        name = "crux_msgs/msg/Error"
-        if reply is None:
-            return self.types.make(name, kind="", field="", message="", retry_after=0.0)
+    def error(self, reply: ErrorReply) -> Any:
+        """Return crux's error as ``crux_msgs/msg/Error``."""
         error = reply.error
-        again = 0.0 if error.retry_after is msgspec.UNSET else error.retry_after
+        again = 0.0 if error.retry_after is UNSET else error.retry_after
         return self.types.make(
-            name,
+            "crux_msgs/msg/Error",
             kind=error.kind,
             field=error.field or "",
             message=error.message,
@@ -232,5 +253,18 @@ def wrench_entries(wrench: Any) -> list[float]:
     return [float(getattr(part, axis)) for part in parts for axis in "xyz"]
 
 
-def _number(value: float | None) -> float:
+def number(value: float | None) -> float:
+    """Return a number, NaN where there is none."""
     return math.nan if value is None else value
+
+
+def _tensions(hand: HandReply | HandSetPoints) -> Vector:
+    if isinstance(hand, HandSetPoints):
+        return hand.tensions
+    return [finger.tendon_tension for finger in hand.fingers]
+
+
+def _angles(hand: HandReply | HandSetPoints) -> Vector:
+    if isinstance(hand, HandSetPoints):
+        return hand.winch_angle
+    return [finger.winch_angle for finger in hand.fingers]

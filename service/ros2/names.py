@@ -16,7 +16,7 @@ from typing import NamedTuple, Self
 
 from hand_models.base import InvalidInputError
 
-__all__ = ["Attachment", "Endpoint", "EndpointKind", "NodeNames", "ros_domain"]
+__all__ = ["Attachment", "Endpoint", "EndpointKind", "NodeNames", "Quality", "ros_domain"]
 
 
 class EndpointKind(StrEnum):
@@ -25,6 +25,15 @@ class EndpointKind(StrEnum):
     PUBLISHER = "MP"
     SUBSCRIPTION = "MS"
     SERVICE = "SS"
+
+
+class Quality(StrEnum):
+    """Quality of service of an endpoint, as its liveliness token names it; all are reliable."""
+
+    VOLATILE = "::,10:,:,:,,"
+    """ROS 2's default, with a history of 10 messages."""
+    LATCHED = ":1:,1:,:,:,,"
+    """Transient local: who subscribes later gets the last message."""
 
 
 class Endpoint(NamedTuple):
@@ -38,11 +47,13 @@ class Endpoint(NamedTuple):
         Type, such as ``crux_msgs/srv/Plan``.
     type_hash : str
         Hash of the type, ``RIHS01_`` and 64 hexadecimal digits.
+    quality : Quality
     """
 
     name: str
     type: str
     type_hash: str
+    quality: Quality = Quality.VOLATILE
 
     @property
     def typed(self) -> str:
@@ -97,9 +108,6 @@ class NodeNames:
     def token(self, kind: EndpointKind, endpoint: Endpoint, number: int) -> str:
         """Return the key of an endpoint's liveliness token.
 
-        Its last part is the quality of service: that of ROS 2's default (reliable, volatile), with
-        a history of 10 messages.
-
         Parameters
         ----------
         kind : EndpointKind
@@ -110,7 +118,7 @@ class NodeNames:
         mangled = endpoint.name.replace("/", "%")
         return (
             f"@ros2_lv/{self.domain}/{self.session}/0/{number}/{kind}/{self._node}/{mangled}/"
-            f"{endpoint.typed}/::,10:,:,:,,"
+            f"{endpoint.typed}/{endpoint.quality}"
         )
 
     @property

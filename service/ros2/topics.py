@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -11,13 +13,17 @@ import zenoh
 from msgspec import UNSET
 
 from hand_models.base import CruxError
-from service.replies import PublishedReply
+from service.replies import ErrorReply, PublishedReply, StreamReply
 from service.requests import WrenchRequest
+from service.ros2.calls import OwnQuestion, RosQuestion
 from service.ros2.health import DiagnosticState
 from service.ros2.messages import RosMessages, wrench_entries
-from service.wire import Format, ServiceName, read_reply, stream_key
+from service.ros2.settings import ROS_SETTINGS
+from service.wire import Format, ServiceName, read_reply, service_key, stream_key
 
 __all__ = ["RosStream"]
+
+log = logging.getLogger(__name__)
 
 
 class RosStream:
@@ -37,6 +43,8 @@ class RosStream:
         Publishes the ``sensor_msgs/msg/JointState`` of all tendons.
     publish_wrench : callable
         Publishes the ``geometry_msgs/msg/WrenchStamped`` of one hand.
+    ask : callable
+        Takes a question, and the key of crux's own service that answers it.
     """
 
     def __init__(
@@ -46,8 +54,9 @@ class RosStream:
         messages: RosMessages,
         publish_joints: Callable[[Any], None],
         publish_wrench: Callable[[Any], None],
+        ask: Callable[[RosQuestion, str], None],
     ) -> None:
-        self._session, self._robot = session, robot
+        self._session, self._robot, self._ask = session, robot, ask
         self._messages = messages
         self._publish_joints, self._publish_wrench = publish_joints, publish_wrench
         self._lock = threading.Lock()
@@ -56,14 +65,22 @@ class RosStream:
         self._newest: PublishedReply | None = None
         self._refused = ""
         self._sent = 0
+        self._declared: tuple[bytes, bytes] | None = None
+        self._declarations, self._declared_at = 0, -math.inf
 
-    def follow(self, stream: str) -> None:
+    def follow(self, stream: str, request: bytes, caller: bytes) -> None:
         """Take wrenches for a stream from now on, and publish its set-points.
+
+        When the service no longer keeps the stream and a wrench comes, it is declared again.
 
         Parameters
         ----------
         stream : str
             Identifier of the stream.
+        request : bytes
+            The request that has declared it, in JSON.
+        caller : bytes
+            Global identifier of the caller by ROS 2, 16 bytes.
         """
         key = stream_key(self._robot, stream, ServiceName.SET_POINTS)
         # what the service itself publishes, and nobody else
@@ -73,6 +90,8 @@ class RosStream:
         with self._lock:
             before, self._points, self._stream = self._points, points, stream
             self._newest, self._refused, self._sent = None, "", 0
+            self._declared = request, caller
+            self._declarations += 1
         if before is not None:
             before.undeclare()
 
@@ -80,6 +99,7 @@ class RosStream:
         """Publish no more set-points."""
         with self._lock:
             points, self._points, self._stream = self._points, None, ""
+            self._declared = None
         if points is not None:
             points.undeclare()
 
@@ -117,6 +137,7 @@ class RosStream:
             stream, newest, sent = self._stream, self._newest, self._sent
         level, message = 0, "waits for wrenches" if stream else "no stream is declared by ROS 2"
         values = {"stream": stream, "set-points published": str(sent)}
+        values["declarations"] = str(self._declarations)
         if newest is not None:
             values |= {"age [s]": f"{newest.age:.6f}", "skipped before it": str(newest.skipped)}
             if (error := newest.error) is not None:
@@ -141,6 +162,29 @@ class RosStream:
         with self._lock:
             if reply.stream == self._stream:
                 self._newest, self._sent = reply, self._sent + (found is not None)
+            lost = reply.stream == self._stream and reply.error is not None
+        if lost and reply.error is not None and reply.error.field == "stream":
+            self._declare_again()
+
+    def _declare_again(self) -> None:
+        """Declare the stream again, with its first request; not more often than now and then."""
+        now = time.monotonic()
+        with self._lock:
+            early = now < self._declared_at + ROS_SETTINGS.declaration_pause
+            if self._declared is None or early:
+                return
+            (request, caller), self._declared_at = self._declared, now
+
+        def replied(payload: bytes, encoding: str) -> None:
+            reply = Format.named(encoding).decode(payload, StreamReply)
+            log.warning("the stream that ROS 2 has declared was lost, and is declared again")
+            self.follow(reply.stream, request, caller)
+
+        def refused(error: ErrorReply) -> None:
+            log.warning("the lost stream could not be declared again: %s", error.error.message)
+
+        question = OwnQuestion(caller, request, replied, refused)
+        self._ask(question, service_key(self._robot, ServiceName.STREAM))
 
 
 def _refusal(header: Any) -> str:

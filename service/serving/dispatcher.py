@@ -225,7 +225,7 @@ class Dispatcher:
         if question.fault is not None:
             self._replies.refuse(question, question.fault)
             return
-        question.place = self._names.place(question.client, question.secret)
+        question.place = self._names.place(question.client, question.secret, question.caller)
         if self._inquire and self._names.is_to_prove(question.client, question.secret):
             self._replies.later(SharedQueue.INQUIRIES, partial(self._inquire, question.client))
         if question.name == ServiceName.CANCEL:

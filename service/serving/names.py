@@ -73,7 +73,8 @@ class ClientIdentity:
 class ClientNames:
     """Record of the sessions that ask questions: their links, and proofs of their identifiers.
 
-    For use in one thread. Proofs are in an LRU cache of 4096 sessions.
+    For use in one thread. Proofs are in an LRU cache of 4096 sessions. Callers by ROS 2 have no
+    proof: whoever makes up identifiers gets as many places as there are for such callers, at most.
 
     Attributes
     ----------
@@ -87,8 +88,13 @@ class ClientNames:
         self._proofs: LRUCache[str, set[bytes]] = LRUCache(most)
         # made-up names are to push out no proven ones; a digest is asked for once a second
         self._asked: TTLCache[str, bool] = TTLCache(most, ttl=1.0, timer=time.perf_counter)
+        self._ros: TTLCache[bytes, str] = TTLCache(
+            SERVING_SETTINGS.ros_callers,
+            ttl=SERVING_SETTINGS.ros_caller_time,
+            timer=time.perf_counter,
+        )
 
-    def place(self, name: str, secret: bytes) -> str:
+    def place(self, name: str, secret: bytes, caller: bytes = b"") -> str:
         """Return the place (client) that a query counts for when workers' time is shared.
 
         Parameters
@@ -97,6 +103,9 @@ class ClientNames:
             Identifier in the query; empty if there is none.
         secret : bytes
             Attachment of the query; empty if there is none.
+        caller : bytes, optional
+            Global identifier of the caller by ROS 2, which has a place of its own unless too many
+            have one.
 
         Returns
         -------
@@ -104,6 +113,13 @@ class ClientNames:
             The identifier, if it is proven by the secret, or if no proof is known and its session
             is linked. Otherwise ``""``, the place of all clients that cannot be distinguished.
         """
+        if caller:
+            self._ros.expire()
+            if caller not in self._ros and len(self._ros) == self._ros.maxsize:
+                return ""
+            # from now on it is remembered for the full time again
+            self._ros[caller] = f"ros2 {caller.hex()}"
+            return self._ros[caller]
         proofs = self._proofs.get(name)
         if proofs is not None:
             return name if digest(secret) in proofs else ""
@@ -134,8 +150,8 @@ class ClientNames:
         return name in self._proofs
 
     def connected(self) -> frozenset[str]:
-        """Return the identifiers of all sessions that are linked, or have proven theirs."""
-        return frozenset(self.linked) | frozenset(self._proofs)
+        """Return the places of all sessions that are linked or proven, and of ROS 2's callers."""
+        return frozenset(self.linked) | frozenset(self._proofs) | frozenset(self._ros.values())
 
     def gone(self, name: str) -> None:
         """Forget the link and the digests of a session that has disconnected."""

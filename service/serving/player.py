@@ -104,6 +104,7 @@ def play(
     speed: float = 1.0,
     wait: float | None = None,
     late: Callable[[float], None] | None = None,
+    sent: Callable[[ClimbSetPoints], None] | None = None,
 ) -> int:
     """Publish the set-points of a climb at the key ``crux/<robot>/play``, each at its time.
 
@@ -126,6 +127,9 @@ def play(
         How long to wait for a subscriber [s]; 1 s by default.
     late : callable, optional
         Called before set-points that are late, with the delay [s].
+    sent : callable, optional
+        Called with all set-points but the last repetition, once they are sent; what it raises ends
+        the playing.
 
     Returns
     -------
@@ -156,11 +160,11 @@ def play(
         form = Format.JSON
         publisher.put(form.encode(points), encoding=form.label(points))
 
+    last: ClimbSetPoints | None = None
     token = session.liveliness().declare_token(f"{key}/{session.info.zid()}/{uuid4().hex}")
     try:
         _await_subscriber(publisher, wait)
         _refuse_rivals(session, key)
-        sent: ClimbSetPoints | None = None
         start = time.monotonic() - knots[0].time / speed
         try:
             for points in climb_set_points(knots, speed / rate):
@@ -169,20 +173,22 @@ def play(
                     time.sleep(early)
                 else:
                     start -= early
-                    if late is not None and sent is not None:
+                    if late is not None and last is not None:
                         late(-early)
                 send(points)
-                sent = points
+                last = points
+                if sent is not None:
+                    sent(points)
         except BaseException as error:
-            if sent is not None:
-                send(replace(sent, number=sent.number + 1, state="stopped"))
+            if last is not None:
+                send(replace(last, number=last.number + 1, state="stopped"))
                 if isinstance(error, Interrupted):
-                    at = f"stopped at {sent.time:.2f} s of {knots[-1].time:.2f} s"
+                    at = f"stopped at {last.time:.2f} s of {knots[-1].time:.2f} s"
                     raise Interrupted(at) from None
             raise
-        assert sent is not None  # of at least one knot
-        send(replace(sent, number=sent.number + 1, state="done"))
-        return sent.number + 1
+        assert last is not None  # of at least one knot
+        send(replace(last, number=last.number + 1, state="done"))
+        return last.number + 1
     finally:
         token.undeclare()
         publisher.undeclare()

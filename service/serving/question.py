@@ -14,7 +14,7 @@ from service.answering import SERVICES_BY_NAME
 from service.processes import Job
 from service.publishing import PublishedWrench
 from service.requests import LEAST_REPLY_BYTES, LONGEST_DEADLINE, CancelRequest
-from service.ros2 import RosCall
+from service.ros2 import RosQuestion
 from service.serving.settings import SERVING_SETTINGS
 from service.wire import (
     LARGEST_ERROR,
@@ -28,8 +28,8 @@ from service.wire import (
 
 __all__ = ["AnyQuery", "PendingQuestion", "client_of", "received_question"]
 
-AnyQuery = zenoh.Query | PublishedWrench | RosCall
-"""What is answered: a query, a published wrench, whose answer is published, or a ROS 2 call."""
+AnyQuery = zenoh.Query | PublishedWrench | RosQuestion
+"""What is answered: a query, a published wrench, whose answer is published, or a ROS 2 caller's."""
 
 
 class _Head(msgspec.Struct):
@@ -51,7 +51,7 @@ class PendingQuestion:
 
     Attributes
     ----------
-    query : zenoh.Query, PublishedWrench or RosCall
+    query : zenoh.Query, PublishedWrench or RosQuestion
         The query, which gets exactly one last reply, and before it parts if it asks for them.
     key : str
         Key at which the query arrived.
@@ -62,6 +62,8 @@ class PendingQuestion:
     place : str
         Client for which the question counts when workers' time is shared; empty for clients that
         cannot be distinguished.
+    caller : bytes
+        Global identifier of the caller by ROS 2; empty for other clients.
     secret : bytes
         Secret by which the client proves its identifier; empty without one.
     arrived : float
@@ -111,6 +113,7 @@ class PendingQuestion:
     begun: float = -1.0
     place: str = ""
     secret: bytes = b""
+    caller: bytes = b""
 
     @property
     def deadline(self) -> float:
@@ -174,7 +177,7 @@ def received_question(query: AnyQuery, key: str, arrived: float, longest: float)
 
     Parameters
     ----------
-    query : zenoh.Query, PublishedWrench or RosCall
+    query : zenoh.Query, PublishedWrench or RosQuestion
         The query.
     key : str
         Key at which the query arrived; of a wrench, where its set-points are published.
@@ -215,6 +218,7 @@ def received_question(query: AnyQuery, key: str, arrived: float, longest: float)
         or len(payload) > SERVING_SETTINGS.large_payload,
         fault=fault,
         secret=secret,
+        caller=query.caller if isinstance(query, RosQuestion) else b"",
         # a client that reads no set-points may read replies
         replies_by=key if isinstance(query, PublishedWrench) else "",
     )

@@ -106,7 +106,7 @@ def reply_to(query: AnyQuery, key: str, make_answer: Callable[[], Answer]) -> No
 
     Parameters
     ----------
-    query : zenoh.Query, PublishedWrench or RosCall
+    query : zenoh.Query, PublishedWrench or RosQuestion
         The query.
     key : str
         Key under which the reply is sent.

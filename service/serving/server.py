@@ -23,6 +23,7 @@ from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
 from service.ros2 import RosNode
 from service.serving.config import close_at_once
 from service.serving.dispatcher import Dispatcher
+from service.serving.player import play
 from service.serving.settings import SERVING_SETTINGS
 from service.serving.worker_pool import WorkerPool
 from service.wire import Answer, ServiceName, service_key
@@ -164,7 +165,8 @@ class PlanService:
         self._until_the_end(liveliness.declare_subscriber(self._client_key("*"), self._client))
         if self.ros is not None:
             self._open.callback(self.ros.close)
-            self.ros.open(self._dispatcher.ask, self._monitor.health)
+            player = partial(play, self._session, self.robot)
+            self.ros.open(self._dispatcher.ask, self._monitor.health, player)
         self._open.callback(self._dispatcher.stop)
         self._until_the_end(liveliness.declare_token(self._alive))
         return self

@@ -39,6 +39,11 @@ class ServingSettings:
     waiting_bytes_of_place: int = 2**26
     """Largest sum for one place [bytes]; a single question may be larger."""
 
+    ros_callers: int = 32
+    """Most callers by ROS 2 that have a place of their own: a caller can make up identifiers."""
+    ros_caller_time: float = 60.0
+    """Time after its last call for which a caller by ROS 2 keeps its place [s]."""
+
     remembered: int = 4096
     """Size of the LRU caches of client identifiers, places and stances."""
     remembered_costs: int = 20

@@ -15,7 +15,7 @@ from hand_models.base import InvalidInputError
 from service.ros2 import definitions, names, ros_domain
 from service.wire import MalformedError
 from tests.suite.helpers.checkout import ROOT
-from tests.suite.helpers.ros_peer import RosPeer
+from tests.suite.helpers.ros_peer import DEFINITIONS, RosPeer
 
 PACKAGE = definitions.package_folder()
 SERVICES = ("Plan", "SetPoints", "Stream", "WrenchSpace")
@@ -36,6 +36,28 @@ PUBLISHED_MESSAGES = {
     ),
 }
 """Hashes as ``ros2 topic info --verbose`` and clients of rmw_zenoh publish them."""
+
+PUBLISHED_ACTION = {
+    "example_interfaces/action/Fibonacci_SendGoal": (
+        "d1a57fb2a4afe8c21e34fb10db206f16ce6729b28531141472df92277c55b557"
+    ),
+    "example_interfaces/action/Fibonacci_SendGoal_Request": (
+        "3d088942b413247db536576f0286768c6be8fcd5d0c9a5d544f359fba090a238"
+    ),
+    "example_interfaces/action/Fibonacci_GetResult": (
+        "1b0de0d5d29dc955d92f546706568428632771db13ec84c15ec1c1a59f424a57"
+    ),
+    "example_interfaces/action/Fibonacci_FeedbackMessage": (
+        "c1de71afd52e49a89c53d8262366884185bc0a02f78ce051c4e46b0a7fe59bb2"
+    ),
+    "action_msgs/srv/CancelGoal": (
+        "573d8b0a534451d7bc2ac8c5ffde8ac14b8593b7001175d0cd6516dcbeb8689a"
+    ),
+    "action_msgs/msg/GoalStatusArray": (
+        "6c1684b00f177d37438febe6e709fc4e2b0d4248dca4854946f9ed8b30cda83e"
+    ),
+}
+"""Hashes of what an action has, as the type descriptions of ROS 2 and several clients have them."""
 
 PUBLISHED_SERVICES = {
     "example_interfaces/srv/AddTwoInts": (
@@ -82,26 +104,67 @@ def test_a_service_has_the_published_hash(name: str, peer: RosPeer) -> None:
     assert peer.type_hash(name) == f"RIHS01_{digest}"
 
 
+def test_an_action_has_the_published_hashes(peer: RosPeer) -> None:
+    name, parts = "example_interfaces/action/Fibonacci", ("int32 order", *2 * ("int32[] sequence",))
+    types = definitions.RosTypes(definitions.action_definitions(name, *parts))
+    peer.add_action(name, "\n---\n".join(parts))
+    for each, digest in PUBLISHED_ACTION.items():
+        assert types.type_hash(each) == f"RIHS01_{digest}", each
+        # the other computation is right, too
+        assert peer.type_hash(each) == f"RIHS01_{digest}", each
+
+
 def test_own_types_have_the_hashes_of_another_computation(
     types: definitions.RosTypes, peer: RosPeer
 ) -> None:
     own = [name for name in peer.fields if name.startswith("crux_msgs/")]
     assert {f"crux_msgs/srv/{name}" for name in SERVICES} <= {*own}
+    assert "crux_msgs/action/Climb_GetResult" in own
     for name in own:
         assert types.type_hash(name) == peer.type_hash(name), name
     hashes = {types.type_hash(name) for name in own}
     assert len(hashes) == len(own)
 
 
+def test_types_of_others_have_the_hashes_of_another_computation(
+    types: definitions.RosTypes, peer: RosPeer
+) -> None:
+    for name in DEFINITIONS.keys() - {"service_msgs/msg/ServiceEventInfo"}:
+        assert types.type_hash(name) == peer.type_hash(name), name
+
+
+def test_what_is_left_out_of_a_message_is_zero_or_empty(
+    types: definitions.RosTypes, peer: RosPeer
+) -> None:
+    marker = types.make("visualization_msgs/msg/Marker", ns="a", id=3)
+    read = peer.decode("visualization_msgs/msg/Marker", types.encode(marker))
+    assert (read["ns"], read["id"], read["points"], read["text"]) == ("a", 3, [], "")
+    assert read["pose"]["orientation"] == dict.fromkeys("xyzw", 0.0)
+    assert read["texture"]["data"] == b""
+    goal = types.make("action_msgs/msg/GoalInfo")
+    assert peer.decode("action_msgs/msg/GoalInfo", types.encode(goal))["goal_id"]["uuid"] == bytes(
+        16
+    )
+
+
 def test_types_of_others_are_the_same_from_iron_to_lyrical() -> None:
-    used = [*PUBLISHED_MESSAGES, "builtin_interfaces/msg/Time", "geometry_msgs/msg/Wrench"]
+    used = [
+        *PUBLISHED_MESSAGES,
+        "builtin_interfaces/msg/Time",
+        "geometry_msgs/msg/Wrench",
+        "visualization_msgs/msg/MarkerArray",
+        "sensor_msgs/msg/PointCloud2",
+        "action_msgs/msg/GoalStatusArray",
+    ]
     stores = (Stores.ROS2_IRON, Stores.ROS2_JAZZY, Stores.ROS2_KILTED, Stores.ROS2_LYRICAL)
     found = [[get_typestore(store).hash_rihs01(name) for name in used] for store in stores]
     assert all(one == other for one, other in pairwise(found))
 
 
 def test_the_package_builds_every_definition_and_depends_on_what_they_use() -> None:
-    listed = re.findall(r'"((?:msg|srv)/\w+\.\w+)"', (PACKAGE / "CMakeLists.txt").read_text())
+    listed = re.findall(
+        r'"((?:action|msg|srv)/\w+\.\w+)"', (PACKAGE / "CMakeLists.txt").read_text()
+    )
     files = sorted(str(file.relative_to(PACKAGE)) for file in PACKAGE.glob("*/*.*"))
     assert listed == files
     about = ElementTree.parse(PACKAGE / "package.xml").getroot()
@@ -110,7 +173,8 @@ def test_the_package_builds_every_definition_and_depends_on_what_they_use() -> N
     assert about.findtext("version") == project["version"]
     texts = "".join(file.read_text("utf-8") for file in PACKAGE.glob("*/*.*"))
     used = set(re.findall(r"^(\w+)/", texts, re.MULTILINE)) - {"crux_msgs"}
-    assert {each.text for each in about.findall("depend")} == used
+    # what every action needs
+    assert {each.text for each in about.findall("depend")} == used | {"action_msgs"}
 
 
 def test_cdr_is_what_another_codec_writes_and_reads(

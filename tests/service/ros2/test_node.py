@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import os
 import queue
 import signal
 import struct
@@ -13,13 +15,15 @@ import msgspec
 import numpy as np
 import pytest
 import zenoh
+import zenoh.ext
 
 from service.answering import answer_plan
 from service.commands.cli import run_command_line
-from service.replies import PlanReply, WrenchSpaceReply
+from service.replies import HealthReply, PlanReply, WrenchSpaceReply
 from service.ros2 import RosNode
 from service.ros2.definitions import package_folder
 from service.serving import open_session, zenoh_config
+from tests.service.ros2.test_clouds import cloud
 from tests.suite.helpers.commands import BAD_INPUT, complaint
 from tests.suite.helpers.patience import PATIENCE, soon
 from tests.suite.helpers.replies import departures
@@ -136,9 +140,24 @@ def test_ros_sees_the_node_with_its_services_and_topics(call: Caller, service: S
         ("MS", f"{NODE}/body_wrench"),
         ("MP", f"{NODE}/tendons"),
         ("MP", f"{NODE}/hand_wrenches"),
+        ("MP", f"{NODE}/plan_markers"),
+        ("MS", f"{NODE}/rock"),
+        ("MP", f"{NODE}/climb_joints"),
+        ("MP", f"{NODE}/climb_tendons"),
+        ("MS", f"{NODE}/slips"),
     ]
-    assert {*ends} == {*topics}
-    assert service.ready["ros2"] == [*named, *(name for _, name in topics)]
+    of_action = [
+        *(
+            ("SS", f"{NODE}/climb/_action/{name}")
+            for name in ("send_goal", "cancel_goal", "get_result")
+        ),
+        *(("MP", f"{NODE}/climb/_action/{name}") for name in ("feedback", "status")),
+    ]
+    assert {*ends} == {*topics, *of_action}
+    latched = {name for (_, name), token in ends.items() if token[12:] == [":1:,1:,:,:,,"]}
+    assert latched == {f"{NODE}/plan_markers", f"{NODE}/climb/_action/status"}
+    names = [*named, f"{NODE}/climb", *(name for _, name in topics)]
+    assert service.ready["ros2"] == names
 
 
 def test_a_plan_is_the_one_in_process_and_wrenches_are_of_the_world_on_the_robot(
@@ -245,6 +264,78 @@ def test_a_stream_gives_set_points_also_without_a_tile(call: Caller) -> None:
     assert without["set_points"]["effort"] != whole["set_points"]["effort"]
 
 
+def test_a_plan_is_drawn_for_those_who_subscribe_later(call: Caller) -> None:
+    call("plan", "Plan", request=msgspec.json.encode(wall_request()).decode())
+    kind, got = "visualization_msgs/msg/MarkerArray", queue.Queue()
+    late = zenoh.ext.declare_advanced_subscriber(
+        call.session,
+        call.peer.key(DOMAIN, f"{NODE}/plan_markers", kind),
+        lambda sample: got.put(call.peer.decode(kind, sample.payload.to_bytes())),
+        history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
+    )
+    names = {(mark["ns"], mark["id"]) for mark in got.get(timeout=PATIENCE)["markers"]}
+    assert {("plan", 0), ("front_left/palm", 0), ("rear_right/hand_force", 0)} <= names
+    late.undeclare()
+
+
+def test_a_request_refers_to_the_rock_of_a_cloud(call: Caller, diagnostics: queue.Queue) -> None:
+    request = wall_request()
+    for each in request["stance"]["hands"]:
+        each["hold"] = {"shape": "rock", "rock": "scan"}
+        each["grasp"] = {"outer_rotation": 0.0}
+    asked = msgspec.json.encode(request).decode()
+    answer = call("plan", "Plan", request=asked)
+    assert answer["error"]["kind"] == "invalid"
+    state = state_with(diagnostics, 2, level=0)
+    assert (state["name"], state["message"]) == ("crux/robosimian: rock", "no cloud came yet")
+    poses = [pose_of(each["pose"]) for each in request["stance"]["hands"]]
+    across, up = poses[0].rotation[:, 0], poses[0].rotation[:, 1]
+    steps = np.arange(-0.15, 0.15, 0.004)
+    grid = np.array([(a, b) for a in steps for b in steps])
+    places = [pose.position + grid @ np.array([across, up]) for pose in poses]
+    in_body = pose_of(request["stance"]["body"]).inverse()
+    points = np.array([in_body.apply(point) for point in np.concatenate(places)])
+    name, kind = f"{NODE}/rock", "sensor_msgs/msg/PointCloud2"
+    key, message = call.peer.key(DOMAIN, name, kind), cloud(points, "B")
+    call.session.put(
+        key, call.peer.encode(kind, message), attachment=bytes(16) + b"\x10" + bytes(16)
+    )
+
+    def made() -> bool:
+        state = state_with(diagnostics, 2, level=0)
+        return "name" in values_of(state)
+
+    assert soon(made)
+    answer = call("plan", "Plan", request=asked)
+    assert answer["error"] == NO_ERROR
+    hands = msgspec.json.decode(answer["reply"])["hands"]
+    contacts = [tile["contact"] for tile in hands[0]["fingers"][0]["tiles"]]
+    assert contacts != ["none"] * len(contacts)
+
+
+def test_a_stream_that_was_lost_is_declared_again(
+    call: Caller, service: Served, diagnostics: queue.Queue
+) -> None:
+    answer = call("stream", "Stream", request=msgspec.json.encode(stream_request()).decode())
+    first = msgspec.json.decode(answer["reply"])["body_wrench"]
+    assert values_of(state_with(diagnostics, 1, level=0))["stream"] == answer["stream"]
+    (reply,) = call.session.get("crux/robosimian/health", timeout=PATIENCE)
+    health = msgspec.json.decode(reply.ok.payload.to_bytes(), type=HealthReply)
+    (keeper,) = [each.pid for each in health.processes if each.purpose == "streams"]
+    os.kill(keeper, signal.SIGKILL)
+    subscriber, got = call.subscribe(f"{NODE}/tendons", "sensor_msgs/msg/JointState")
+    stamp = itertools.count(1_700_000_000_000_000_000)
+
+    def has_set_points() -> bool:
+        call.publish(first, next(stamp))
+        return not got.empty()
+
+    assert soon(has_set_points)
+    values = values_of(state_with(diagnostics, 1, level=0))
+    assert values["stream"] != answer["stream"]
+    subscriber.undeclare()
+
+
 @pytest.fixture(scope="module")
 def diagnostics(call: Caller) -> Iterator[queue.Queue]:
     subscriber, got = call.subscribe("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
@@ -347,7 +438,7 @@ def test_a_node_that_closes_is_gone(router: str, call: Caller) -> None:
     before = call.tokens()
     with open_session(client_config(router)) as session:
         node = RosNode(session, "other", DOMAIN)
-        node.open(lambda *_: None, lambda: pytest.fail("too early"))
+        node.open(lambda *_: None, lambda: pytest.fail("too early"), lambda *_, **__: 0)
         assert soon(lambda: len(call.tokens()) == 2 * len(before))
         node.close()
         assert soon(lambda: sorted(call.tokens()) == sorted(before))

@@ -18,8 +18,8 @@ KIND = "geometry_msgs/msg/WrenchStamped"
 def taken(sec: int, nanosec: int, frame: str) -> tuple[Mock, str]:
     """The session of a stream that has got a wrench, and what its state says."""
     session = Mock()
-    stream = RosStream(session, "robot", MESSAGES, Mock(), Mock())
-    stream.follow("stream")
+    stream = RosStream(session, "robot", MESSAGES, Mock(), Mock(), Mock())
+    stream.follow("stream", b"{}", bytes(16))
     zero = dict.fromkeys("xyz", 0.0)
     header = {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": frame}
     data = PEER.encode(KIND, {"header": header, "wrench": {"force": zero, "torque": zero}})

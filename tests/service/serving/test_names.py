@@ -10,6 +10,7 @@ import pytest
 import zenoh
 
 from service.serving import CruxClient, open_session, zenoh_config
+from service.serving.names import ClientNames
 from service.serving.settings import SERVING_SETTINGS
 from service.wire import ServiceName, service_key
 from tests.service.serving.test_dispatcher import LONG, PLAN, Site, all_up, kind, result, until
@@ -162,3 +163,16 @@ def test_who_says_that_he_has_gone_is_told_so() -> None:
             assert all("pid" in result(each) for each in held)
     finally:
         site.close()
+
+
+def test_callers_by_ros_2_have_places_of_their_own_but_not_without_end() -> None:
+    known = ClientNames()
+    places = [known.place("", b"", bytes([i]) * 16) for i in range(100)]
+    own = places[: SERVING_SETTINGS.ros_callers]
+    assert len({*own}) == SERVING_SETTINGS.ros_callers
+    assert {*places[len(own) :]} == {""}
+    # who has one keeps it, and counts as connected
+    assert known.place("", b"", bytes(16)) == own[0]
+    assert known.connected() == {*own}
+    # by another identifier nothing is taken from them
+    assert known.place(own[0], b"") == ""

@@ -32,6 +32,34 @@ DEFINITIONS = {
         "byte level\nstring name\nstring message\nstring hardware_id\nKeyValue[] values"
     ),
     "diagnostic_msgs/msg/DiagnosticArray": "std_msgs/Header header\nDiagnosticStatus[] status",
+    "std_msgs/msg/ColorRGBA": "float32 r\nfloat32 g\nfloat32 b\nfloat32 a",
+    "builtin_interfaces/msg/Duration": "int32 sec\nuint32 nanosec",
+    "geometry_msgs/msg/Point": "float64 x\nfloat64 y\nfloat64 z",
+    "geometry_msgs/msg/Quaternion": "float64 x\nfloat64 y\nfloat64 z\nfloat64 w",
+    "geometry_msgs/msg/Pose": "Point position\nQuaternion orientation",
+    "sensor_msgs/msg/CompressedImage": "std_msgs/Header header\nstring format\nuint8[] data",
+    "visualization_msgs/msg/UVCoordinate": "float32 u\nfloat32 v",
+    "visualization_msgs/msg/MeshFile": "string filename\nuint8[] data",
+    "visualization_msgs/msg/Marker": (
+        "std_msgs/Header header\nstring ns\nint32 id\nint32 type\nint32 action\n"
+        "geometry_msgs/Pose pose\ngeometry_msgs/Vector3 scale\nstd_msgs/ColorRGBA color\n"
+        "builtin_interfaces/Duration lifetime\nbool frame_locked\ngeometry_msgs/Point[] points\n"
+        "std_msgs/ColorRGBA[] colors\nstring texture_resource\n"
+        "sensor_msgs/CompressedImage texture\nUVCoordinate[] uv_coordinates\nstring text\n"
+        "string mesh_resource\nMeshFile mesh_file\nbool mesh_use_embedded_materials"
+    ),
+    "visualization_msgs/msg/MarkerArray": "Marker[] markers",
+    "sensor_msgs/msg/PointField": "string name\nuint32 offset\nuint8 datatype\nuint32 count",
+    "sensor_msgs/msg/PointCloud2": (
+        "std_msgs/Header header\nuint32 height\nuint32 width\nPointField[] fields\n"
+        "bool is_bigendian\nuint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense"
+    ),
+    "unique_identifier_msgs/msg/UUID": "uint8[16] uuid",
+    "action_msgs/msg/GoalInfo": (
+        "unique_identifier_msgs/UUID goal_id\nbuiltin_interfaces/Time stamp"
+    ),
+    "action_msgs/msg/GoalStatus": "GoalInfo goal_info\nint8 status",
+    "action_msgs/msg/GoalStatusArray": "GoalStatus[] status_list",
     "service_msgs/msg/ServiceEventInfo": (
         "uint8 event_type\nbuiltin_interfaces/Time stamp\nuint8[16] client_gid\n"
         "int64 sequence_number"
@@ -42,14 +70,20 @@ DEFINITIONS = {
 PLAIN = {
     "bool": (15, "?"),
     "byte": (16, "B"),
+    "int8": (2, "b"),
     "uint8": (3, "B"),
     "int32": (6, "i"),
     "uint32": (7, "I"),
     "int64": (8, "q"),
+    "float32": (10, "f"),
     "float64": (11, "d"),
     "string": (17, ""),
 }
 """Number in a type description, and format in `struct`, of each type that is not a message."""
+
+
+ME = bytes(range(100, 116))
+"""Global identifier of a client."""
 
 
 class Field(NamedTuple):
@@ -73,12 +107,41 @@ class RosPeer:
             self.fields[name] = self._parsed(file.read_text("utf-8"), package.name)
         for file in package.glob("srv/*.srv"):
             self.add_service(f"{package.name}/srv/{file.stem}", file.read_text("utf-8"))
+        info = "action_msgs/GoalInfo"
+        cancel = f"{info} goal_info\n---\nint8 return_code\n{info}[] goals_canceling"
+        self.add_service("action_msgs/srv/CancelGoal", cancel)
+        for file in package.glob("action/*.action"):
+            self.add_action(f"{package.name}/action/{file.stem}", file.read_text("utf-8"))
+
+    def add_action(self, name: str, text: str) -> None:
+        """Add the two services and the feedback of an action, after the design of actions."""
+        package = name.split("/")[0]
+        for part, lines in zip(("Goal", "Result", "Feedback"), text.split("---"), strict=True):
+            self.fields[f"{name}_{part}"] = self._parsed(lines, package)
+        me = Field("goal_id", "unique_identifier_msgs/msg/UUID")
+        parts = {
+            "SendGoal_Request": [me, Field("goal", f"{name}_Goal")],
+            "SendGoal_Response": [
+                Field("accepted", "bool"),
+                Field("stamp", "builtin_interfaces/msg/Time"),
+            ],
+            "GetResult_Request": [me],
+            "GetResult_Response": [Field("status", "int8"), Field("result", f"{name}_Result")],
+            "FeedbackMessage": [me, Field("feedback", f"{name}_Feedback")],
+        }
+        self.fields |= {f"{name}_{part}": fields for part, fields in parts.items()}
+        self._add_event(f"{name}_SendGoal")
+        self._add_event(f"{name}_GetResult")
 
     def add_service(self, name: str, text: str) -> None:
         package = name.split("/")[0]
         asked, answered = f"{name}_Request", f"{name}_Response"
         for part, lines in zip((asked, answered), text.split("---"), strict=True):
             self.fields[part] = self._parsed(lines, package)
+        self._add_event(name)
+
+    def _add_event(self, name: str) -> None:
+        asked, answered = f"{name}_Request", f"{name}_Response"
         self.fields[f"{name}_Event"] = [
             Field("info", "service_msgs/msg/ServiceEventInfo"),
             Field("request", asked, 1, bounded=True),
@@ -154,7 +217,11 @@ class RosPeer:
                 if field.size is None:
                     self._write(out, field.type, given)
                     continue
-                self._write(out, "uint32", len(given))
+                if not field.size:
+                    self._write(out, "uint32", len(given))
+                if field.type == "uint8":
+                    out += bytes(given)
+                    continue
                 for each in given:
                     self._write(out, field.type, each)
 
@@ -179,7 +246,12 @@ class RosPeer:
             if field.size is None:
                 found[field.name], at = self._read(data, at, field.type)
                 continue
-            count, at = self._read(data, at, "uint32")
+            count = field.size
+            if not count or field.bounded:
+                count, at = self._read(data, at, "uint32")
+            if field.type == "uint8":
+                found[field.name], at = data[at : at + count], at + count
+                continue
             found[field.name] = []
             for _ in range(count):
                 value, at = self._read(data, at, field.type)
@@ -193,16 +265,28 @@ class RosPeer:
         return f"{domain}{name}/{package}::{sort}::dds_::{last}_/{self.type_hash(kind)}"
 
     def call(
-        self, session: zenoh.Session, domain: int, name: str, kind: str, request: dict[str, Any]
+        self,
+        session: zenoh.Session,
+        domain: int,
+        name: str,
+        kind: str,
+        request: dict[str, Any],
+        me: bytes = ME,
     ) -> dict[str, Any]:
         data = self.encode(f"{kind}_Request", request)
-        return self.call_with(session, domain, name, kind, data)
+        return self.call_with(session, domain, name, kind, data, me)
 
     def call_with(
-        self, session: zenoh.Session, domain: int, name: str, kind: str, data: bytes
+        self,
+        session: zenoh.Session,
+        domain: int,
+        name: str,
+        kind: str,
+        data: bytes,
+        me: bytes = ME,
     ) -> dict[str, Any]:
-        """Call as rmw_zenoh does, with a payload that may be wrong."""
-        before, number, me = time.time_ns(), 7, bytes(range(100, 116))
+        """Call as rmw_zenoh does, with a payload that may be wrong, as the client ``me``."""
+        before, number = time.time_ns(), 7
         attached = struct.pack("<qqB", number, before, 16) + me
         replies = list(
             session.get(
