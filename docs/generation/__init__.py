@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from generation.api import api_pages
+from generation.layouts import layout_page
 from generation.messages import message_page
 from generation.parameters import parameter_page
 from generation.transcripts import key_pages
@@ -20,6 +21,7 @@ def write_all(folder: Path) -> None:
     }
     pages |= {name: text.encode() for name, text in api_pages().items()}
     pages |= key_pages()
+    pages["layouts.md"] = layout_page(pages).encode()
     for name, content in pages.items():
         file = folder / name
         if not file.is_file() or file.read_bytes() != content:
