@@ -1,4 +1,4 @@
-"""The client on zenoh-pico: what its source sends, and what a limit of 4,096 bytes lets through."""
+"""The client in C: what its source sends, and what a limit of 4,096 bytes lets through."""
 
 from __future__ import annotations
 
@@ -120,27 +120,35 @@ def test_where_no_detail_is_given_as_much_comes_as_fits(endpoint: str) -> None:
     assert len(reply["hands"][0]["wrench"]) == 6  # of detail hands
 
 
-def test_the_client_is_built_and_asks(endpoint: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("library", "header", "flag"),
+    [("zenohpico", "zenoh-pico.h", "-DZENOH_LINUX"), ("zenohc", "zenoh.h", "-DZENOH_C")],
+)
+def test_the_client_is_built_and_asks(
+    library: str, header: str, flag: str, endpoint: str, tmp_path: Path
+) -> None:
     compiler = shutil.which("cc")
     if compiler is None:
         pytest.skip("no C compiler")
-    flags = ["-std=c11", "-DZENOH_LINUX"]
+    flags = ["-std=c11", flag]
     if shutil.which("pkg-config") is not None:
         found = subprocess.run(
-            ["pkg-config", "--cflags", "--libs", "zenohpico"],
+            ["pkg-config", "--cflags", "--libs", library],
             capture_output=True,
             text=True,
             check=False,
         )
         flags += found.stdout.split()
     probe = tmp_path / "probe.c"
-    probe.write_text("#include <zenoh-pico.h>\n")
+    probe.write_text(f"#include <{header}>\n")
     there = subprocess.run([compiler, *flags, "-fsyntax-only", str(probe)], capture_output=True)
     if there.returncode:
-        pytest.skip("zenoh-pico is not installed: its zenoh-pico.h is not found")
+        pytest.skip(f"{library} is not installed: its {header} is not found")
     program = tmp_path / "pico_client"
     subprocess.run(
-        [compiler, str(SOURCE), *flags, "-lzenohpico", "-o", str(program)], check=True, cwd=tmp_path
+        [compiler, str(SOURCE), *flags, f"-l{library}", "-o", str(program)],
+        check=True,
+        cwd=tmp_path,
     )
     done = subprocess.run(
         [str(program), endpoint], capture_output=True, text=True, check=True, timeout=PATIENCE
