@@ -200,11 +200,11 @@ class ClimbAction:
 
     def _request(self, goal: ActionGoal) -> bytes:
         """Return the climb's request, with parts, and with the goal as its ``id``."""
-        for name in ("rate", "speed"):
-            if not 0.0 <= getattr(goal.asked, name) <= 1000.0:
-                raise InvalidInputError(
-                    f"{getattr(goal.asked, name)}; valid: up to 1000, or 0", field=name
-                )
+        # a goal is cancelled between two set-points
+        for name, least in (("rate", 1.0), ("speed", 1e-3)):
+            value = getattr(goal.asked, name)
+            if value != 0.0 and not least <= value <= 1000.0:
+                raise InvalidInputError(f"{value}; valid: {least:g} to 1000, or 0", field=name)
         try:
             asked = msgspec.json.decode(goal.asked.request, type=dict[str, msgspec.Raw])
         except (msgspec.DecodeError, msgspec.ValidationError) as error:

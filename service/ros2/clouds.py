@@ -17,12 +17,13 @@ import zenoh
 
 from hand_models import scans
 from hand_models.base import Array, CruxError, InvalidInputError, LimitError, Pose, oriented_pose
+from hand_models.parameters import scan_table
 from service.requests import PoseMessage
 from service.ros2.health import DiagnosticState
 from service.ros2.messages import RosMessages
 from service.ros2.settings import ROS_SETTINGS
 
-__all__ = ["ROCK_NAME", "RosRock", "cloud_points"]
+__all__ = ["ROCK_NAME", "RosRock", "cloud_points", "make_rock"]
 
 log = logging.getLogger(__name__)
 
@@ -179,7 +180,7 @@ class RosRock:
                 (points, frame), self._newest = self._newest, None
                 ours, theirs = multiprocessing.Pipe()
                 context = multiprocessing.get_context("spawn")
-                made = context.Process(target=_make, args=(theirs, points, frame), daemon=True)
+                made = context.Process(target=make_rock, args=(theirs, points, frame), daemon=True)
                 self._process, self._meshing = made, True
             made.start()
             theirs.close()
@@ -253,8 +254,18 @@ def _mesh(rock: _Rock, pose: Pose) -> msgspec.Raw:
     return msgspec.Raw(msgspec.json.encode(mesh))
 
 
-def _make(into: Connection, points: Array, frame: str) -> None:
-    """Make rock of points, in a process of its own; send it, or why there is none."""
+def make_rock(into: Connection, points: Array, frame: str) -> None:
+    """Make rock of points, in a process of its own; send it, or why there is none.
+
+    Parameters
+    ----------
+    into : multiprocessing.connection.Connection
+        Where the rock is sent, or the reason as a text.
+    points : ndarray, shape (n, 3)
+        Points in the frame [m].
+    frame : str
+        ``W``, or ``B``, from whose origin they were seen.
+    """
     finite = points[np.isfinite(points).all(axis=1)]
     try:
         if len(finite) < 3:
@@ -269,13 +280,27 @@ def _make(into: Connection, points: Array, frame: str) -> None:
             assumed=frame == "W",
         )
         made = scans.mesh_scan(scan)
+        most = ROS_SETTINGS.rock_vertices
+        if len(made.vertices) > most:
+            # squares of that side, each of which keeps one point, cover the outline
+            area = float(np.prod(made.extent[:2])) * made.covered
+            spacing = (area / most) ** 0.5
+            # holes of that width are bridged; points that are much more apart than half of it leave
+            # holes everywhere
+            widest = 0.5 * scan_table().scalar("mesh", "hole")
+            if spacing > widest:
+                raise LimitError(
+                    f"rock of {area:.3g} m²; the maximum is {most * widest**2:.3g} m²: cut "
+                    "the cloud to what is near the hands"
+                )
+            made = scans.mesh_scan(scan, spacing=spacing)
     except CruxError as error:
         hint = "; a cloud in W is to have W's origin before the rock, where it was seen from"
         into.send(f"{error}{hint if error.field == 'view' else ''}")
         return
     words = (
         f"{made.read:,} points, {len(made.faces):,} triangles, {made.extent.max():.3g} m, "
-        f"{len(made.holes)} holes"
+        f"{1e3 * made.spacing:.2g} mm apart, {len(made.holes)} holes"
     )
     # micrometres, which no scanner measures
     vertices = msgspec.json.encode(made.vertices.round(6).tolist())

@@ -30,8 +30,12 @@ class RosSettings:
     cloud_bytes: int = 2**26
     """Largest point cloud that is taken [bytes]: 4 million points of 16 bytes, as much as a scan of
     a wall has; crux's own requests have the same bound."""
-    mesh_time: float = 60.0
-    """Longest time in which a cloud becomes rock [s]; a million points take some 10 s."""
+    rock_vertices: int = 150_000
+    """Most vertices of rock that is made of a cloud; it is thinned to so many. Their triangles take
+    some 11 MB in a request, and the declaration of a stream may have 16 MiB."""
+    mesh_time: float = 180.0
+    """Longest time in which a cloud becomes rock [s]; a million points took 7 s of processor time,
+    and 38 s beside much other work."""
     subscriber_wait: float = 1.0
     """Time for which a climb that is to be played waits for a subscriber by ROS 2 [s]."""
     goals: int = 4

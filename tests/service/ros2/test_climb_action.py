@@ -211,7 +211,11 @@ def test_goals_without_a_climb_and_with_errors_are_aborted(site: Site) -> None:
     result = site.result(name).result(PATIENCE)
     assert result["status"] == ABORTED
     assert result["result"]["error"]["field"] == "start.height"
-    for request, other, field in (("[", {}, "request"), (REQUEST, {"speed": -1.0}, "speed")):
+    for request, other, field in (
+        ("[", {}, "request"),
+        (REQUEST, {"speed": -1.0}, "speed"),
+        (REQUEST, {"rate": 0.01}, "rate"),
+    ):
         name, answer = site.send(request, **other)
         assert answer["accepted"]
         result = site.result(name).result(PATIENCE)

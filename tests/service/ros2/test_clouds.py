@@ -12,7 +12,7 @@ import pytest
 import zenoh
 
 from hand_models.base import InvalidInputError, Pose
-from service.ros2.clouds import ROCK_NAME, RosRock, cloud_points
+from service.ros2.clouds import ROCK_NAME, RosRock, cloud_points, make_rock
 from service.ros2.definitions import package_folder
 from service.ros2.messages import RosMessages
 from service.ros2.settings import RosSettings
@@ -147,3 +147,21 @@ def test_rock_stands_in_requests_where_it_was_seen() -> None:
     assert "points: 0 finite" in rock.state().message
     assert json.loads(rock.placed_in(asked))["stance"]["rocks"]["scan"] == mesh
     rock.close()
+
+
+@pytest.mark.parametrize(
+    ("most", "words"), [(400, " 5 mm apart"), (50, "rock of 0.01 m²; the max")]
+)
+def test_rock_of_many_points_is_thinned_and_too_much_refused(
+    most: int, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.ros2.clouds.ROS_SETTINGS", RosSettings(rock_vertices=most))
+    across = np.arange(-0.05, 0.05, 0.002)
+    sent: list[Any] = []
+    points = np.array([(0.8, y, z) for y in across for z in across])
+    make_rock(SimpleNamespace(send=sent.append), points, "W")
+    (made,) = sent
+    if most == 50:
+        assert made.startswith("rock of 0.0096 m²; the maximum is 0.005 m²: cut the cloud")
+        return
+    assert 0.5 * most < len(json.loads(made.vertices)) < 1.5 * most
