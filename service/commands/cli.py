@@ -57,12 +57,16 @@ COMMANDS_BY_NAME: Final = {
         "Search for the best climb on each ROCK, with proof how much better any other can be.",
     ),
     "demo": Entry(
-        "network",
+        "plans",
         "Start the service, ask it for a plan of a real stance, and draw the answer.",
     ),
     "holds": Entry(
         "holds",
         "Propose holds on ROCK, a mesh in metres (of a scan, `crux rock` makes one).",
+    ),
+    "keys": Entry(
+        "network",
+        "Make certificates and rights: who may ask a service, and who may only watch it.",
     ),
     "new": Entry(
         "plans",
@@ -70,7 +74,7 @@ COMMANDS_BY_NAME: Final = {
     ),
     "plan": Entry("plans", "Make one plan, without the network."),
     "play": Entry(
-        "network",
+        "live",
         "Send the set-points of a climb to a robot: publish them in time, until the end or Ctrl-C.",
     ),
     "query": Entry("network", "Ask a running service for a plan."),

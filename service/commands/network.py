@@ -1,4 +1,4 @@
-"""Define the commands that serve, ask and publish over zenoh: serve, query, play, demo, schema."""
+"""Define the commands of the service on zenoh: serve, keys, query, schema."""
 
 from __future__ import annotations
 
@@ -15,14 +15,20 @@ import click
 import msgspec
 
 from hand_models.base import InvalidInputError
-from service import answering, bulk, processes, requests, serving, tables, wire
+from service import processes, requests, security, serving, tables, wire
 from service.commands import options, stances
 from service.ros2 import ros_domain
 
 if TYPE_CHECKING:
     import zenoh
 
-__all__ = ["demo_command", "play_command", "query_command", "schema_command", "serve_command"]
+__all__ = [
+    "keys_command",
+    "query_command",
+    "schema_command",
+    "serve_command",
+    "zenoh_options",
+]
 
 
 def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -128,11 +134,8 @@ def serve_command(
         )
         if metrics_port is not None:
             service.serve_metrics(metrics_port)
-        if service.has_rival():
-            tables.note(
-                f"another service already answers {wire.service_key(service.robot, '…')}: queries "
-                "may reach either; --no-multicast-scouting keeps services apart"
-            )
+        if rivals := service.rivals():
+            tables.note(rivals)
         where = ", ".join(endpoints) or "no address"
         tables.remark(f"listening on {where}; the workers start, which takes some seconds")
         with service:
@@ -217,144 +220,122 @@ def query_command(
     return tables.show(reply, as_json)
 
 
-@click.command("play")
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@zenoh_options
-@click.option(
-    "--rate",
-    type=options.FiniteRange(1.0, 1e4),
-    default=100.0,
+@click.group("keys")
+def keys_command() -> None:
+    """Make certificates and rights: who may ask a service, and who may only watch it.
+
+    DIR is the folder that crux keys make makes. It has a zenoh configuration for each name, for -c
+    of crux serve and of all clients.
+    """
+
+
+folder_argument = click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+hosts_option = click.option(
+    "--host",
+    "hosts",
+    multiple=True,
+    metavar="HOST",
+    help="Name or address of the machine that listens, as others reach it; may be repeated.",
+)
+days_option = click.option(
+    "--days",
+    type=click.IntRange(1, 3650),
+    default=365,
     show_default=True,
-    metavar="HZ",
-    help="Least number of set-points in a second.",
+    help="Validity of the certificates.",
+)
+
+
+@keys_command.command("make")
+@folder_argument
+@hosts_option
+@click.option("--port", type=click.IntRange(1, 65535), default=7447, show_default=True)
+@days_option
+@click.option(
+    "--robot",
+    default=wire.DEFAULT_ROBOT,
+    show_default=True,
+    metavar="NAME",
+    help="Robot for whose keys the rights are.",
 )
 @click.option(
-    "--speed",
-    type=options.FiniteRange(0.0, min_open=True, max=100.0),
-    default=1.0,
-    show_default=True,
-    help="Time of the climb over time that passes; 1 keeps the controller's rates.",
-)
-@click.option("--up-to-failure", is_flag=True, help="Play a climb that ends in the middle, too.")
-@click.option(
-    "--wait",
-    type=options.FiniteRange(0.0, 1e6),
-    metavar="SECONDS",
-    help="Wait so long for a subscriber, the robot's controller; by default "
-    f"{serving.SERVING_SETTINGS.search_timeout:g}.",
+    "--domain",
+    type=click.IntRange(0, 232),
+    help="ROS domain of crux serve --ros2; its nodes get a certificate, too.",
 )
 @options.json_option
-def play_command(
+def make_command(
     folder: Path,
-    config: zenoh.Config,
-    rate: float,
-    speed: float,
-    up_to_failure: bool,
-    wait: float | None,
+    hosts: tuple[str, ...],
+    port: int,
+    days: int,
+    robot: str,
+    domain: int | None,
     as_json: bool,
 ) -> None:
-    """Send the set-points of a climb to a robot: publish them in time, until the end or Ctrl-C.
+    """Make an authority, and keys of a service, a planner and an observer.
 
-    DIR is what crux route has written. Between knots, set-points are interpolated. Each is a
-    message at crux/<robot>/play; the last one comes again with the state done, or stopped. The
-    robot has to be at the start of the climb.
+    Without --host, they are for this machine alone.
     """
-    knots, about = bulk.read_climb(folder)
-    failure = about.climb.failure
-    if failure is not None and not up_to_failure:
-        raise InvalidInputError(
-            f"{folder}: the climb fails in move {failure.move} ({failure.phase}): "
-            f"{failure.reason}; --up-to-failure plays what comes before",
-            field="DIR",
-        )
-    if unsure := [knot.index for knot in knots if not knot.verified]:
-        raise InvalidInputError(f"{folder}: knot {unsure[0]} is not verified", field="DIR")
-    duration = knots[-1].time - knots[0].time
-    if not as_json:
-        tables.remark(f"playing {about.route}: {len(knots)} knots in {duration / speed:.1f} s")
-        if speed > 1.0:
-            tables.note(f"at speed {speed:g}, tensions and joints exceed the controller's rates")
-    serving.start_zenoh_log()
-    with serving.open_session(config) as session:
-        delays = [0.0]
-        sent = serving.play(
-            session, about.robot, knots, rate=rate, speed=speed, wait=wait, late=delays.append
-        )
-    # a controller hardly feels less than a period, or 10 ms
-    if not as_json and max(delays) > max(1.0 / rate, 0.01):
-        tables.note(
-            f"set-points were late, one of them by {1e3 * max(delays):.0f} ms: the climb took "
-            f"{sum(delays):.2f} s longer; try a lower --rate, or a machine with less to do"
-        )
-    if as_json:
-        tables.say({"v": 1, "set_points": sent, "knots": len(knots), "time": duration})
-    else:
-        tables.console().print(f"{sent} set-points of {len(knots)} knots were published")
+    where = hosts or ("localhost", "127.0.0.1")
+    made = security.KeyFolder.make(folder, robot, where, port, days, domain)
+    _tell_names(made, as_json)
+    tables.remark(f"{folder}/ca-key.pem makes further names: keep it where nobody else reads it")
 
 
-@click.command("demo")
-@click.option(
-    "-o",
-    "--output",
-    "picture",
-    type=options.OutputFile(*options.PICTURE_ENDINGS),
-    default="crux-demo.png",
-    show_default=True,
-    metavar="FILE",
-    help="Where the picture goes.",
-)
-@click.option(
-    "--climb",
-    "folder",
-    is_flag=False,
-    flag_value="crux-climb",
-    type=click.Path(path_type=Path, file_okay=False),
-    metavar="[DIR]",
-    help="Search for a climb on the bundled knob-wall instead; where its files go.",
-)
-@options.page_option
-@options.own_options
+@keys_command.command("add")
+@folder_argument
+@click.argument("name", metavar="NAME")
+@click.option("--role", type=click.Choice([*map(str, security.Role)]), required=True)
+@hosts_option
+@days_option
 @options.json_option
-def demo_command(
-    picture: Path, folder: Path | None, page: Path | None, own: options.Own, as_json: bool
-) -> int:
-    """Start the service, ask it for a plan of a real stance, and draw the answer.
+def add_command(
+    folder: Path, name: str, role: str, hosts: tuple[str, ...], days: int, as_json: bool
+) -> None:
+    """Make the key of another name, and give it the rights of its role."""
+    keys = security.KeyFolder(folder)
+    changed = keys.add(name, security.Role(role), hosts, days)
+    _tell_names(keys, as_json)
+    _tell_changed(changed)
 
-    A robot of --robot whose limbs do not reach that stance's holds is planned for without joints.
-    """
-    if folder is not None:
-        from service import climbs
-        from service.commands.routes import search_climb
 
-        asked = own.asked(climbs.demo_request())
-        return search_climb(asked, folder, options.WorkersOption(None, None), own, as_json, page)
-    tables.write_alone(picture)
-    request = options.with_extras(own.asked(stances.read_request("wall-300-joints")))
-    serving.start_zenoh_log()
-    config = serving.zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
-    with (
-        serving.open_session(config) as session,
-        serving.PlanService(session, own.robot, workers=1) as service,
-    ):
-        # [s] its own service answers, also on a busy machine
-        client = serving.CruxClient(session, service.robot, timeout=120.0)
-        try:
-            reply = client.plan(request)
-        except wire.ServiceError as error:
-            if error.kind != "unreachable":
-                raise
-            tables.remark(f"planned without joints: {error.message}")
-            stance = msgspec.structs.replace(request.stance, joints=None)
-            request = msgspec.structs.replace(request, stance=stance)
-            reply = client.plan(request)
-    answer = answering.planned(request, own.robots)
-    tables.write_plan_picture(answer, picture)
-    if page is not None:
-        tables.write_answer_page(answer, page, "wall-300-joints")
-    status = tables.show(reply, as_json)
-    if not as_json:
-        tables.console().print(f"picture: {picture}")
-    return status
+@keys_command.command("remove")
+@folder_argument
+@click.argument("name", metavar="NAME")
+@options.json_option
+def remove_command(folder: Path, name: str, as_json: bool) -> None:
+    """Take all rights from a name, and remove its configuration."""
+    keys = security.KeyFolder(folder)
+    changed = keys.remove(name)
+    _tell_names(keys, as_json)
+    _tell_changed(changed)
+
+
+@keys_command.command("list")
+@folder_argument
+@options.json_option
+def list_command(folder: Path, as_json: bool) -> None:
+    """List names, roles, hosts, and until when they are valid."""
+    _tell_names(security.KeyFolder(folder), as_json)
+
+
+def _tell_names(keys: security.KeyFolder, as_json: bool) -> None:
+    if as_json:
+        tables.say({"v": 1, "folder": str(keys.path), "names": keys.names})
+        return
+    for each in keys.names:
+        hosts = f", at {', '.join(each.hosts)}" if each.hosts else ""
+        line = f"{keys.path / each.name}.json5: {each.role}, until {each.until:%Y-%m-%d}{hosts}"
+        tables.console().print(line, soft_wrap=True, highlight=False)
+
+
+def _tell_changed(changed: list[Path]) -> None:
+    if changed:
+        tables.remark(
+            f"changed: {', '.join(map(str, changed))}; copy them to their machines and start those "
+            "services anew: the rights are read at the start"
+        )
 
 
 @click.command("schema")

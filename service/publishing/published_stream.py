@@ -9,6 +9,7 @@ from contextlib import suppress
 from typing import Any, Protocol, Self
 
 import zenoh
+from msgspec import UNSET
 from zenoh.handlers import Callback
 
 from hand_models.base import CruxError, InvalidInputError
@@ -49,7 +50,7 @@ class PublishedStream:
     robot : str
         Name of the robot.
     declare : callable
-        Declares the stream and returns the reply.
+        Declares the stream; returns the reply, and the identifier of the service that keeps it.
     form : Format
         Encoding of the wrenches.
     identity : object
@@ -70,7 +71,7 @@ class PublishedStream:
         self,
         session: zenoh.Session,
         robot: str,
-        declare: Callable[[], StreamReply],
+        declare: Callable[[], tuple[StreamReply, str]],
         form: Format,
         identity: _Identity,
     ) -> None:
@@ -86,7 +87,7 @@ class PublishedStream:
         self._away = self._closed = False
         self.lost = 0
         self.declarations = 1
-        self.declared = declare()
+        self.declared, self._server = declare()
         self._points = self._subscribed()
         liveliness = session.liveliness()
         self._tokens = [
@@ -217,7 +218,8 @@ class PublishedStream:
             if reply.stream != self.declared.stream or late:
                 return
             if reply.error is not None and reply.error.field == "stream":
-                self._away = True
+                # another service may not know yet that it is not its own
+                self._away |= reply.server in (UNSET, self._server)
             else:
                 if number >= 0:
                     self.lost += max(number - self._last - 1 - reply.skipped, 0)
@@ -245,7 +247,7 @@ class PublishedStream:
                     return
             self._service_came.clear()
             try:
-                self._renew(self._declare())
+                self._renew(*self._declare())
             except CruxError as error:
                 if error.kind in REQUEST_KINDS:
                     with self._changed:
@@ -258,10 +260,11 @@ class PublishedStream:
                 # the session may be closed before this is
                 self._service_came.wait(1.0)
 
-    def _renew(self, declared: StreamReply) -> None:
+    def _renew(self, declared: StreamReply, server: str) -> None:
         with self._changed:
             if self._closed:
                 return
+            self._server = server
             before, self.declared, self._away = self._points, declared, False
             self.declarations += 1
         points = self._subscribed()

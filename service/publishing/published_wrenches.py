@@ -156,6 +156,7 @@ class PublishedWrench:
             time=head.time,
             age=time.perf_counter() - self.arrived,
             skipped=self._skipped,
+            server=self._among.server,
             **content,
         )
         self._among.publish(self.stream, form.encode(message), form.label(message))
@@ -179,17 +180,26 @@ class PublishedWrenches:
         Session of the service.
     robot : str
         Name of the robot.
+
+    Attributes
+    ----------
+    server : str
+        Identifier of the service's session.
     """
 
     def __init__(self, session: zenoh.Session, robot: str) -> None:
         self._session, self._robot = session, robot
+        self.server = str(session.info.zid())
         self._ask: Ask | None = None
-        self._subscriber: zenoh.Subscriber[None] | None = None
+        self._subscribers: list[Any] = []
         self._lock = threading.Lock()
         self._streams: dict[str, _Incoming] = {}
         # a declaration may wait for a client that does not read
         self._declaring = ThreadPoolExecutor(1, "crux-tokens")
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
+        self._own: frozenset[str] = frozenset()
+        # streams that have a token, of this service or of another
+        self._kept: set[str] = set()
 
     def take(self, ask: Ask) -> None:
         """Subscribe to wrenches.
@@ -201,15 +211,15 @@ class PublishedWrenches:
             not wait.
         """
         self._ask = ask
-        key = stream_key(self._robot, "*", ServiceName.WRENCH)
-        self._subscriber = self._session.declare_subscriber(
-            key, Callback(self._came, indirect=False)
-        )
+        seen, key = Callback(self._see, indirect=False), stream_key(self._robot, "*")
+        tokens = self._session.liveliness().declare_subscriber(key, seen, history=True)
+        came, key = Callback(self._came, indirect=False), f"{key}/{ServiceName.WRENCH}"
+        self._subscribers = [tokens, self._session.declare_subscriber(key, came)]
 
     def close(self) -> None:
         """Take in no more wrenches, and withdraw the tokens."""
-        if self._subscriber is not None:
-            self._subscriber.undeclare()
+        for each in self._subscribers:
+            each.undeclare()
         self.keep(())
         self._declaring.shutdown()
 
@@ -221,7 +231,8 @@ class PublishedWrenches:
         streams : iterable of str
             Identifiers of all streams that the service keeps.
         """
-        self._declaring.submit(self._declare, frozenset(streams))
+        self._own = frozenset(streams)
+        self._declaring.submit(self._declare, self._own)
 
     def _declare(self, streams: frozenset[str]) -> None:
         for stream in self._tokens.keys() - streams:
@@ -230,10 +241,20 @@ class PublishedWrenches:
             key = stream_key(self._robot, stream)
             self._tokens[stream] = self._session.liveliness().declare_token(key)
 
+    def _see(self, sample: zenoh.Sample) -> None:
+        """See the token of a stream come or go."""
+        stream = str(sample.key_expr).rpartition("/")[2]
+        if sample.kind == zenoh.SampleKind.PUT:
+            self._kept.add(stream)
+        else:
+            self._kept.discard(stream)
+
     def _came(self, sample: zenoh.Sample) -> None:
-        if sample.kind != zenoh.SampleKind.PUT:
-            return
         now, stream = time.perf_counter(), str(sample.key_expr).split("/")[-2]
+        # another service answers those of its streams
+        elsewhere = stream in self._kept and stream not in self._own
+        if sample.kind != zenoh.SampleKind.PUT or elsewhere:
+            return
         try:
             check_size(len(sample.payload), WrenchRequest)
         except LimitError:

@@ -121,6 +121,8 @@ class PublishedReply(Struct, kw_only=True):
     - ``set_points``: the set-points, with their ``gap``; null where there is an error.
     - ``error``: why there are no set-points; null where there are. If its ``field`` is ``stream``,
       no such stream is kept: declare it again.
+    - ``server``: identifier of the service that has published this; of several, only the one that
+      keeps a stream knows it.
     """
 
     v: int = 1
@@ -131,3 +133,4 @@ class PublishedReply(Struct, kw_only=True):
     skipped: int
     set_points: SetPointsReply | None = None
     error: ErrorDetail | None = None
+    server: str | UnsetType = UNSET

@@ -5,15 +5,12 @@ from __future__ import annotations
 import threading
 import time
 import uuid
-from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
-from queue import SimpleQueue
-from typing import Self
+from typing import Self, TypeVar
 
 import msgspec
 import zenoh
-from msgspec import UNSET
 from zenoh.handlers import Callback
 
 from hand_models.base import CruxError, InvalidInputError
@@ -24,8 +21,6 @@ from service.replies import (
     CancelReply,
     ClimbReply,
     DiagnosisReply,
-    ErrorReply,
-    PartReply,
     PlanReply,
     RouteReply,
     SetPointsReply,
@@ -40,12 +35,12 @@ from service.requests import (
     DiagnosisRequest,
     PlanRequest,
     Query,
-    Request,
     RouteRequest,
     SetPointsRequest,
     StreamRequest,
     WrenchSpaceRequest,
 )
+from service.servers import HOW_TO_START, Asker, KeptStreams, LiveServers, Parts
 from service.serving.config import open_session, patient
 from service.serving.names import ClientIdentity
 from service.serving.settings import SERVING_SETTINGS
@@ -53,17 +48,14 @@ from service.wire import (
     DEFAULT_ROBOT,
     Format,
     NoServiceError,
-    ServiceError,
     ServiceName,
-    ServiceTimeout,
-    check_size,
     read_reply,
     service_key,
 )
 
 __all__ = ["CruxClient"]
 
-Parts = Callable[[PartReply], None]
+QueryT = TypeVar("QueryT", bound=Query)
 
 
 class CruxClient:
@@ -88,6 +80,11 @@ class CruxClient:
     wait : float, optional
         Longest wait for a service to appear, counted from this call [s]. Without it, the service
         must already run when the first request is sent.
+    spread : bool, optional
+        True to share the questions among all services of the robot that are there, in turns, each
+        time one that has fewest of this client's questions. If a service ends or is too busy,
+        another is asked at once, with what is left of the deadline. A stream stays at its service,
+        and is declared again at another if that ends. By default zenoh's nearest service is asked.
 
     Attributes
     ----------
@@ -110,6 +107,7 @@ class CruxClient:
         timeout: float | None = None,
         form: Format = Format.MSGPACK,
         wait: float | None = None,
+        spread: bool = False,
     ) -> None:
         begun = time.monotonic()
         if wait is not None and not 0.0 <= wait <= threading.TIMEOUT_MAX:
@@ -125,12 +123,18 @@ class CruxClient:
         else:
             self._session = where
         self._identity = ClientIdentity(self._session, robot)
+        self._servers: LiveServers | None = None
         if wait is not None:
             try:
                 self._await(wait, begun)
             except BaseException:
                 self.close()
                 raise
+        if spread:
+            self._servers = LiveServers(self._session, robot, SERVING_SETTINGS.search_timeout)
+        self._asker = Asker(self._session, robot, form, self._identity, self._servers)
+        declare = partial(self._replied, ServiceName.STREAM)
+        self._streams = KeptStreams(self._asker, declare, renew=spread)
 
     def _opened(self, config: zenoh.Config, wait: float | None) -> zenoh.Session:
         try:
@@ -138,7 +142,7 @@ class CruxClient:
         except NoServiceError as error:
             if wait is None:
                 raise NoServiceError(
-                    f"{error}; {_how_to_start()}, or wait for it (wait, --wait)"
+                    f"{error}; {HOW_TO_START}, or wait for it (wait, --wait)"
                 ) from None
             raise self._not_come(wait, f" ({error})") from None
 
@@ -159,9 +163,7 @@ class CruxClient:
             tokens.undeclare()
 
     def _not_come(self, wait: float, why: str = "") -> NoServiceError:
-        return NoServiceError(
-            f"no service of {self.robot} within {wait:g} s{why}; {_how_to_start()}"
-        )
+        return NoServiceError(f"no service of {self.robot} within {wait:g} s{why}; {HOW_TO_START}")
 
     def __enter__(self) -> Self:
         return self
@@ -173,6 +175,8 @@ class CruxClient:
         """Withdraw the client's zenoh declarations; close the session if the client opened it."""
         if not self._session.is_closed():
             self._identity.withdraw()
+            if self._servers is not None:
+                self._servers.close()
         if self._owned is not None:
             self._owned.close()
 
@@ -281,23 +285,29 @@ class CruxClient:
         CruxError
             As `plan` raises.
         """
-        request = CancelRequest(v=1, id=identifier)
+        request, name = CancelRequest(v=1, id=identifier), ServiceName.CANCEL
         waits = self.timeout or SERVING_SETTINGS.client_timeout
-        return read_reply(self._answer(ServiceName.CANCEL, request, waits), CancelReply).cancelled
+        servers = () if self._servers is None else self._servers.names()
+        # any of them may have the question
+        replies = [self._asker.ask_one(each, name, request, waits) for each in servers]
+        if not any(replies):
+            replies = [self._asker.ask(name, request, waits)]
+        samples = [each.ok for each in replies if each is not None and each.ok is not None]
+        return sum(read_reply(each, CancelReply).cancelled for each in samples)
 
     def stream(self, request: StreamRequest) -> StreamReply:
         """Declare a stance as a stream of body wrenches; the reply has the stream's identifier.
 
         Raises the errors that `plan` raises.
         """
-        return read_reply(self._ask(ServiceName.STREAM, request), StreamReply)
+        return self._streams.declare(request)[0]
 
     def publish_stream(self, request: StreamRequest) -> PublishedStream:
         """Declare a stream as `stream` does, to publish its wrenches; it takes up again by itself.
 
         Raises the errors that `plan` raises.
         """
-        declare, identity = partial(self.stream, request), self._identity
+        declare, identity = partial(self._streams.declare, request), self._identity
         return PublishedStream(self._session, self.robot, declare, self.form, identity)
 
     def set_points(self, request: SetPointsRequest) -> SetPointsReply:
@@ -305,7 +315,7 @@ class CruxClient:
 
         Raises the errors that `plan` raises.
         """
-        return read_reply(self._ask(ServiceName.SET_POINTS, request), SetPointsReply)
+        return self._streams.set_points(*self._timed(request))
 
     def diagnosis(self, request: DiagnosisRequest) -> DiagnosisReply:
         """Ask which tile has probably slipped, by the data of motors, and return the reply.
@@ -314,8 +324,17 @@ class CruxClient:
         """
         return read_reply(self._ask(ServiceName.DIAGNOSIS, request), DiagnosisReply)
 
+    def _replied(self, name: str, request: Query) -> zenoh.Reply:
+        return self._asker.ask(name, *self._timed(request))
+
     def _ask(self, name: str, request: Query, parts: Parts | None = None) -> zenoh.Sample:
         """Return the reply that is no error; raise what `plan` raises."""
+        sample = self._asker.ask(name, *self._timed(request), parts).ok
+        assert sample is not None
+        return sample
+
+    def _timed(self, request: QueryT) -> tuple[QueryT, float]:
+        """Return a request with a deadline, and how long its reply is waited for [s]."""
         waits = self.timeout
         # of the time that the client waits, for the answer
         part = 0.9
@@ -325,74 +344,4 @@ class CruxClient:
             # nobody waits for an answer that comes later
             own = min(part * waits, LONGEST_DEADLINE)
             request = msgspec.structs.replace(request, deadline=own)
-        return self._answer(name, request, waits, parts)
-
-    def _answer(
-        self, name: str, request: Request, waits: float, parts: Parts | None = None
-    ) -> zenoh.Sample:
-        """Return the reply to a request that is no error, within so many seconds."""
-        key = service_key(self.robot, name)
-        reply = self._get(key, request, waits, parts)
-        if reply is None:
-            # [s] a service that has just come back needs it
-            time.sleep(0.3)
-            reply = self._get(key, request, waits, parts)
-        if reply is None:
-            raise NoServiceError(
-                f"no service answers at {key}; {_how_to_start()}, or wait for it (wait, --wait)"
-            )
-        if reply.ok is not None:
-            return reply.ok
-        if reply.err is None or not str(reply.err.encoding).startswith("application/"):
-            # an error of zenoh's own, in a plain string: it has only this one
-            raise ServiceTimeout(
-                f"no answer at {key} within {waits:g} s; wait longer (timeout, --timeout)"
-            )
-        detail = read_reply(reply.err, ErrorReply).error
-        raise ServiceError(
-            detail.kind,
-            detail.message,
-            field=detail.field,
-            retry_after=None if detail.retry_after is UNSET else detail.retry_after,
-        )
-
-    def _get(
-        self, key: str, request: Request, timeout: float, parts: Parts | None = None
-    ) -> zenoh.Reply | None:
-        """Return the first last reply that is no error, else the first error, or None without any.
-
-        Parts that come before it are taken of one server.
-        """
-        payload = self.form.encode(request)
-        # what is larger, a service does not take in, and so cannot answer
-        check_size(len(payload), type(request))
-        replies: SimpleQueue[zenoh.Reply | None] = SimpleQueue()
-        self._session.get(
-            key,
-            Callback(replies.put, lambda: replies.put(None), indirect=False),
-            payload=payload,
-            encoding=self.form.label(request),
-            consolidation=zenoh.ConsolidationMode.NONE,
-            timeout=timeout,
-            source_info=self._identity.source(),
-            attachment=self._identity.secret,
-        )
-        error = server = None
-        while (reply := replies.get()) is not None:
-            if reply.ok is None:
-                # of servers that are linked, one may not know the stream that another has
-                error = error or reply
-            elif server not in (None, str(reply.replier_id)):
-                continue
-            elif parts is None or not Format.is_labelled(str(reply.ok.encoding), PartReply):
-                return reply
-            else:
-                server = str(reply.replier_id)
-                parts(read_reply(reply.ok, PartReply))
-        if server is not None and error is None:
-            raise NoServiceError(f"the service at {key} ended before it had answered; ask again")
-        return error
-
-
-def _how_to_start() -> str:
-    return "start a service with `crux serve` where this session reaches it"
+        return request, waits

@@ -7,14 +7,12 @@ import math
 import os
 import re
 import socket
-import struct
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from ipaddress import ip_address
 from pathlib import Path
-from socket import AF_INET, AF_INET6
 from typing import Final
 
 import msgspec
@@ -38,6 +36,16 @@ __all__ = [
 log = logging.getLogger(__name__)
 
 SESSION_MODES: Final = ("peer", "client", "router")
+SECRETS: Final = tuple(
+    f"transport/link/tls/{name}_base64"
+    for name in (
+        "root_ca_certificate",
+        "connect_certificate",
+        "connect_private_key",
+        "listen_certificate",
+        "listen_private_key",
+    )
+)
 
 
 def own_settings() -> dict[str, object]:
@@ -147,6 +155,10 @@ def patient(config: zenoh.Config, seconds: float) -> zenoh.Config:
         Timeout of connecting and of searching, in client mode [s].
     """
     copy = zenoh.Config.from_json5(str(config))
+    for name in SECRETS:
+        # these zenoh leaves out of the text of a configuration
+        if msgspec.json.decode(value := config.get_json(name)) is not None:
+            copy.insert_json5(name, value)
     if msgspec.json.decode(copy.get_json("connect/retry")) is None:
         retries = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
         copy.insert_json5("connect/retry", _json(retries))
@@ -168,8 +180,11 @@ def open_session(config: zenoh.Config) -> zenoh.Session:
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
+        said = _first_line(error)
+        # zenoh does not say why a link over TLS is refused
+        checks = " and its certificates (crux keys list)" if "tls/" in said else ""
         raise NoServiceError(
-            f"no zenoh session: {_first_line(error)}; check its endpoints (--connect, --listen)"
+            f"no zenoh session: {said}; check its endpoints (--connect, --listen){checks}"
         ) from None
 
 
@@ -200,27 +215,6 @@ def ended_in_time(session: zenoh.Session) -> Iterator[zenoh.Session]:
             logging.shutdown()
             sys.stdout.flush()
             os._exit(0)
-
-
-def close_at_once() -> None:
-    """Disable the linger time of this process's TCP connections, so that closing does not wait.
-
-    By default, zenoh's sockets wait for 10 s (`SO_LINGER`) until the other end has read what is
-    left, in a thread and under locks that all of zenoh's links need (zenoh issues 1101 and 2718).
-    Without the linger time the operating system sends what is left in the background.
-    """
-    no_linger = struct.pack("ii", 0, 0)
-    # the numbers of this process's open files
-    for name in os.listdir("/dev/fd"):
-        with suppress(OSError):
-            # what is no socket is refused here
-            link = socket.socket(fileno=int(name))
-            try:
-                if link.type == socket.SOCK_STREAM and link.family in (AF_INET, AF_INET6):
-                    link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, no_linger)
-            finally:
-                # it stays open: it is another's
-                link.detach()
 
 
 def listening(config: zenoh.Config) -> list[str]:

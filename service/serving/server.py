@@ -5,9 +5,13 @@ Nothing is computed in zenoh's threads, and none of them ever blocks.
 
 from __future__ import annotations
 
+import os
+import socket
+import struct
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from functools import partial
+from socket import AF_INET, AF_INET6
 from typing import Any, Self
 
 import zenoh
@@ -21,12 +25,12 @@ from service.processes import Job, answering
 from service.publishing import PublishedWrenches
 from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
 from service.ros2 import RosNode
-from service.serving.config import close_at_once
+from service.servers import rivals_in_words
 from service.serving.dispatcher import Dispatcher
 from service.serving.player import play
 from service.serving.settings import SERVING_SETTINGS
 from service.serving.worker_pool import WorkerPool
-from service.wire import Answer, ServiceName, service_key
+from service.wire import Answer, ServiceName, server_key, service_key
 
 __all__ = ["PlanService"]
 
@@ -67,6 +71,9 @@ class PlanService:
         Zenoh keys of the questions that the service answers.
     operators : tuple of str
         Zenoh keys of the service's health and of its metrics.
+    server : str
+        Identifier of the service among several, that of its session. At
+        ``crux/<robot>/server/<server>/<question>`` it alone answers.
     ros : RosNode or None
         The node of ROS 2.
 
@@ -107,7 +114,8 @@ class PlanService:
             service_key(self.robot, name) for name in (ServiceName.HEALTH, ServiceName.METRICS)
         )
         self._alive = service_key(self.robot, ServiceName.ALIVE)
-        self._session = session
+        self._session, self.server = session, str(session.info.zid())
+        self._takers: dict[str, Callable[[zenoh.Query, str], None]] = {}
         self.ros = None if ros_domain is None else RosNode(session, self.robot, ros_domain)
         made = make or partial(answering, robot, hand)
         self._wrenches = PublishedWrenches(session, self.robot)
@@ -116,15 +124,12 @@ class PlanService:
         self._monitor = self._dispatcher.monitor
         self._open = ExitStack()
 
-    def has_rival(self) -> bool:
-        """Return whether another service already answers for the robot; call it before entering.
+    def rivals(self) -> str | None:
+        """Return what happens to questions, as others answer for the robot; None if nobody does.
 
-        The search takes up to 1 s.
+        Call it before entering. The search takes up to 1 s.
         """
-        replies = self._session.liveliness().get(
-            self._alive, timeout=SERVING_SETTINGS.search_timeout
-        )
-        return any(reply.ok is not None for reply in replies)
+        return rivals_in_words(self._session, self.robot, SERVING_SETTINGS.search_timeout)
 
     def serve_metrics(self, port: int) -> None:
         """Serve the metrics to Prometheus over HTTP, on this machine alone.
@@ -150,13 +155,19 @@ class PlanService:
     def __enter__(self) -> Self:
         self._dispatcher.start()
         self._open.callback(self._dispatcher.close)
+        self._takers = dict.fromkeys(self.keys, self._dispatcher.ask)
         for key in self.keys:
-            self._declare(key, self._dispatcher.ask)
+            self._declare(key, self._takers[key])
         health, metrics = self.operators
-        for key, make_answer in ((health, self._monitor.health), (metrics, self._monitor.metrics)):
-            self._declare(key, partial(self._dispatcher.look, make_answer))
+        looks = ((health, self._monitor.health), (metrics, self._monitor.metrics))
+        self._takers |= {key: partial(self._dispatcher.look, made) for key, made in looks}
+        for key in self.operators:
+            self._declare(key, self._takers[key])
         self._open.callback(self._wrenches.close)
         self._wrenches.take(self._dispatcher.ask)
+        own = Callback(self._own, indirect=False)
+        key = server_key(self.robot, self.server, "*")
+        self._until_the_end(self._session.declare_queryable(key, own, complete=True))
         # clients in this process need no link
         self._dispatcher.linked(str(self._session.info.zid()))
         links, info = Callback(self._transport, indirect=False), self._session.info
@@ -168,7 +179,8 @@ class PlanService:
             player = partial(play, self._session, self.robot)
             self.ros.open(self._dispatcher.ask, self._monitor.health, player)
         self._open.callback(self._dispatcher.stop)
-        self._until_the_end(liveliness.declare_token(self._alive))
+        for token in (self._alive, server_key(self.robot, self.server)):
+            self._until_the_end(liveliness.declare_token(token))
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -187,6 +199,16 @@ class PlanService:
 
         taker = Callback(callback, indirect=False)
         self._until_the_end(self._session.declare_queryable(key, taker, complete=True))
+
+    def _own(self, query: zenoh.Query) -> None:
+        """Take a query at a key of this service alone; no wildcard reaches it."""
+        key = str(query.key_expr)
+        folder, _, name = key.rpartition("/")
+        take = self._takers.get(service_key(self.robot, name))
+        if take is None or folder != server_key(self.robot, self.server):
+            query.drop()
+        else:
+            take(query, key)
 
     def _client_key(self, name: str) -> str:
         return service_key(self.robot, f"{ServiceName.CLIENTS}/{name}")
@@ -227,3 +249,24 @@ class PlanService:
             congestion_control=zenoh.CongestionControl.DROP,
             timeout=SERVING_SETTINGS.search_timeout,
         )
+
+
+def close_at_once() -> None:
+    """Disable the linger time of this process's TCP connections, so that closing does not wait.
+
+    By default, zenoh's sockets wait for 10 s (`SO_LINGER`) until the other end has read what is
+    left, in a thread and under locks that all of zenoh's links need (zenoh issues 1101 and 2718).
+    Without the linger time the operating system sends what is left in the background.
+    """
+    no_linger = struct.pack("ii", 0, 0)
+    # the numbers of this process's open files
+    for name in os.listdir("/dev/fd"):
+        with suppress(OSError):
+            # what is no socket is refused here
+            link = socket.socket(fileno=int(name))
+            try:
+                if link.type == socket.SOCK_STREAM and link.family in (AF_INET, AF_INET6):
+                    link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, no_linger)
+            finally:
+                # it stays open: it is another's
+                link.detach()

@@ -21,6 +21,7 @@ from .json_schema import schema as schema
 from .keys import (
     DEFAULT_ROBOT as DEFAULT_ROBOT,
     ServiceName as ServiceName,
+    server_key as server_key,
     service_key as service_key,
     stream_key as stream_key,
 )

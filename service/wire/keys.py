@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Final
 
-__all__ = ["DEFAULT_ROBOT", "ServiceName", "service_key", "stream_key"]
+__all__ = ["DEFAULT_ROBOT", "ServiceName", "server_key", "service_key", "stream_key"]
 
 
 class ServiceName(StrEnum):
@@ -31,6 +31,8 @@ class ServiceName(StrEnum):
     """Liveliness token, which exists while the service runs."""
     CLIENTS = "clients"
     """Prefix of the liveliness tokens of clients; a session identifier follows."""
+    SERVER = "server"
+    """Prefix of the keys of one of several services; its session's identifier follows."""
 
 
 DEFAULT_ROBOT: Final = "robosimian"
@@ -48,6 +50,22 @@ def service_key(robot: str, name: str) -> str:
         A `ServiceName`.
     """
     return f"crux/{robot}/{name}"
+
+
+def server_key(robot: str, server: str, *parts: str) -> str:
+    """Return a zenoh key of one of several services, ``crux/<robot>/server/<server>/...``.
+
+    Parameters
+    ----------
+    robot : str
+        Name of the robot that the service plans for.
+    server : str
+        Identifier of the service's session.
+    *parts : str
+        A `ServiceName`, where this service alone answers. Without parts, the key of its liveliness
+        token.
+    """
+    return service_key(robot, "/".join((ServiceName.SERVER, server, *parts)))
 
 
 def stream_key(robot: str, stream: str, *parts: str) -> str:

@@ -11,7 +11,8 @@ import pytest
 
 from hand_models.base import LimitError
 from service import CruxClient
-from service.serving import client, config, zenoh_config
+from service.servers import asking
+from service.serving import config, server, zenoh_config
 from service.wire import LARGEST_REQUEST
 from tests.service.serving.test_service import setting
 from tests.suite.helpers.requests import plan_request
@@ -39,7 +40,7 @@ def test_connections_close_at_once_and_stay_open_until_then(host: str) -> None:
             each.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, LINGER)
         before = descriptors()
         for _ in range(50):
-            config.close_at_once()
+            server.close_at_once()
         # pipes and files among them
         assert descriptors() == before
         assert linger_of(here)[0] == linger_of(there)[0] == 0
@@ -78,7 +79,7 @@ def test_a_client_sends_nothing_that_no_service_takes_in(monkeypatch: pytest.Mon
     def refuse(size: int, kind: type) -> None:
         raise LimitError(f"{size} bytes of {kind.__name__}")
 
-    monkeypatch.setattr(client, "check_size", refuse)
+    monkeypatch.setattr(asking, "check_size", refuse)
     alone = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
-    with CruxClient(alone) as asking, pytest.raises(LimitError, match="bytes of PlanRequest"):
-        asking.plan(plan_request())
+    with CruxClient(alone) as client, pytest.raises(LimitError, match="bytes of PlanRequest"):
+        client.plan(plan_request())

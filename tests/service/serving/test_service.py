@@ -338,8 +338,9 @@ def test_a_second_server_of_one_robot_warns(served: Served) -> None:
         if warnings:
             break
     assert warnings == [
-        "crux: another service already answers crux/robosimian/…: queries may reach either; "
-        "--no-multicast-scouting keeps services apart"
+        "crux: another service of robosimian is linked to this one: a question to one makes all of "
+        "them work, and CruxClient takes the first good answer; to share the work, make them "
+        "clients of a router (-m client -e ENDPOINT); --no-multicast-scouting keeps them apart"
     ]
     assert serving.startswith("crux: ready; serving ")
 
@@ -351,11 +352,11 @@ def test_a_rival_is_one_of_the_same_robot_and_while_it_serves() -> None:
     second = zenoh_config(connect=[endpoint], settings=["listen/endpoints:[]"], multicast=False)
     with open_session(first) as there, open_session(second) as here:
         service = PlanService(here)
-        assert not service.has_rival()
+        assert not service.rivals()
         with PlanService(there):
-            assert soon(service.has_rival)
-            assert not PlanService(here, RobotFile("lemur", toml="", urdf="")).has_rival()
-        assert soon(lambda: not service.has_rival())
+            assert soon(service.rivals)
+            assert not PlanService(here, RobotFile("lemur", toml="", urdf="")).rivals()
+        assert soon(lambda: not service.rivals())
 
 
 @pytest.mark.slow

@@ -22,11 +22,12 @@ def free_endpoint() -> str:
 
 
 class Served:
-    """A ``crux serve`` process."""
+    """A ``crux serve`` process, to which clients connect; or one that is a client of a router."""
 
-    def __init__(self, endpoint: str, *more: str) -> None:
+    def __init__(self, endpoint: str, *more: str, routed: bool = False) -> None:
         self.endpoint = endpoint
-        flags = ["-m", "peer", "-l", endpoint, "--no-multicast-scouting", "--json", *more]
+        linked = ["-m", "client", "-e"] if routed else ["-m", "peer", "-l"]
+        flags = [*linked, endpoint, "--no-multicast-scouting", "--json", *more]
         self.process = subprocess.Popen(
             [sys.executable, "-m", "service.commands.cli", "serve", *flags],
             cwd=ROOT,
