@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import random
 import signal
 import statistics
 import subprocess
@@ -26,17 +25,17 @@ from benchmarks.load.asking import (
     at_once,
     dear_questions,
     health,
-    mixed,
     new_stances,
     new_wrenches,
     percentile,
     random_plans,
     spoilt,
 )
-from benchmarks.load.bulk import bulk, memory_of
+from benchmarks.load.bulk import bulk
 from benchmarks.load.others import climb, climbed, greedy, process, starve, starved, unread
 from benchmarks.load.published import echo_published, published_table
 from benchmarks.load.slips import slips_table
+from benchmarks.load.soak import soak
 from hand_models.base import stores
 from planner import processes as proc
 from service.answering import dispatch
@@ -303,59 +302,6 @@ def flood(endpoint: str, key: str, gap: float, seconds: float, tally: Tally) -> 
 
 
 @main.command()
-@click.option("--minutes", default=30.0, show_default=True)
-@click.option("--every", default=10.0, show_default=True, help="A process is killed [s].")
-@click.option("--seed", default=0, show_default=True)
-def soak(minutes: float, every: float, seed: int) -> None:
-    """Ask everything, mixed, with a process killed again and again; count, and watch the memory."""
-    tally, rng = Tally(), random.Random(seed)
-    sizes: list[tuple[float, int]] = []
-    stop = threading.Event()
-
-    def ask(number: int, endpoint: str) -> None:
-        client = Client(endpoint, timeout=60.0)
-        for key, payload, encoding in mixed(seed * 100 + number):
-            if stop.is_set():
-                break
-            start = time.perf_counter()
-            reply = client.ask(key, payload, encoding)
-            tally.note(reply, time.perf_counter() - start)
-        client.close()
-
-    with served() as server:
-        operator = Client(server.endpoint)
-        threads = [threading.Thread(target=ask, args=(i, server.endpoint)) for i in range(4)]
-        for thread in threads:
-            thread.start()
-        start, killed, told = time.perf_counter(), 0, 0.0
-        while (now := time.perf_counter() - start) < 60.0 * minutes:
-            time.sleep(min(every, 60.0 * minutes - now))
-            sizes.append((now, memory_of(server.process.pid)))
-            processes = [p for p in health(operator)["processes"] if p["state"] != "starting"]
-            if processes:
-                os.kill(rng.choice(processes)["pid"], signal.SIGKILL)
-                killed += 1
-            if now - told > 60.0:
-                told = now
-                console.print(
-                    f"{now / 60:.0f} min: {sizes[-1][1] / 2**20:.0f} MB, {dict(tally.statuses)}"
-                )
-        stop.set()
-        for thread in threads:
-            thread.join()
-        operator.close()
-    console.print(f"{dict(tally.statuses)}; {killed} processes killed")
-    console.print(f"the slowest reply took {tally.slowest:.2f} s")
-    early = [size for when, size in sizes if 240.0 <= when <= 360.0] or [size for _, size in sizes]
-    late = [size for when, size in sizes if when >= 60.0 * minutes - 120.0]
-    before, after = statistics.median(early), statistics.median(late)
-    console.print(
-        f"memory of all processes: {before / 2**20:.0f} MB about 5 min, {after / 2**20:.0f} MB at "
-        f"the end: {after / before:.2f}"
-    )
-
-
-@main.command()
 @click.option("--count", default=20_000, show_default=True)
 @click.option("--seed", default=1, show_default=True)
 def fuzz(count: int, seed: int) -> None:
@@ -400,7 +346,7 @@ def memory(first: int, last: int, seed: int) -> None:
         console.print(f"{name}: {info.kept} of {info.most} kept, {info.hits:,} hits")
 
 
-for command in (bulk, climb, climbed, starve, starved, greedy, unread):
+for command in (bulk, climb, climbed, starve, starved, greedy, unread, soak):
     main.add_command(command)
 
 

@@ -15,7 +15,7 @@ import msgspec
 import zenoh
 
 from service.replies import ErrorReply
-from service.wire import Format, service_key
+from service.wire import Format, server_key, service_key
 from tests.suite.helpers.random_requests import random_request
 from tests.suite.helpers.requests import flat_request, full_request, spoil, wall_request
 from tests.suite.helpers.served import client_config
@@ -171,7 +171,17 @@ class Client:
     """A session of its own; asks one question after another, or many."""
 
     def __init__(self, endpoint: str, timeout: float = 30.0) -> None:
-        self.session = zenoh.open(client_config(endpoint))
+        self._take(zenoh.open(client_config(endpoint)), timeout)
+
+    @classmethod
+    def of(cls, session: zenoh.Session, timeout: float = 30.0) -> Client:
+        """Return a client that asks by an open session."""
+        made = cls.__new__(cls)
+        made._take(session, timeout)
+        return made
+
+    def _take(self, session: zenoh.Session, timeout: float) -> None:
+        self.session = session
         self._source = self.session.declare_querier(PLAN)
         self._numbers = itertools.count()
         self._timeout = timeout
@@ -214,7 +224,9 @@ class Client:
         self.session.close()
 
 
-def health(client: Client) -> dict:
-    """What the service says of itself."""
-    reply = client.ask(service_key("robosimian", "health"), b"")
+def health(client: Client, server: str | None = None) -> dict:
+    """What the service says of itself, or one of several."""
+    robot, name = "robosimian", "health"
+    key = service_key(robot, name) if server is None else server_key(robot, server, name)
+    reply = client.ask(key, b"")
     return msgspec.json.decode(reply.ok.payload.to_bytes())

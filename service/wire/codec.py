@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from enum import Enum
@@ -37,6 +38,10 @@ LARGEST_ERROR: Final = 4096
 
 LATER_FIELDS: Final = {"confidence": "leave it out: tile limits are nominal"}
 """Request fields that this version does not support, each with advice for the error message."""
+
+
+_known: set[object] = set()
+_first_decoding = threading.Lock()
 
 
 class Format(Enum):
@@ -104,6 +109,11 @@ class Format(Enum):
         """
         if not payload:
             raise MalformedError(f"empty: nothing was sent, a {kind.__name__} is needed")
+        if kind not in _known:
+            # of two threads that are the first to decode a type, one crashes (msgspec 0.22)
+            with _first_decoding:
+                msgspec.msgpack.Decoder(kind)
+                _known.add(kind)
         try:
             if self is Format.JSON:
                 return msgspec.json.decode(payload, type=kind)

@@ -30,7 +30,7 @@ PAGES: Final = (
 NOT_RUN: Final = "Not run by the tests: "
 """How the caption of a block begins that needs what a test has not."""
 
-ENDPOINT: Final = "tcp/127.0.0.1:7447"
+ENDPOINT: Final = "127.0.0.1:7447"
 """What pages call the service's; a test has one of its own."""
 
 SET_UP: Final = "python3 -m venv"
@@ -74,7 +74,7 @@ class Block:
 
 def blocks(page: Path, endpoint: str = ENDPOINT) -> Iterator[Block]:
     """Yield a page's blocks of code, in order."""
-    text = page.read_text("utf-8").replace(ENDPOINT, endpoint)
+    text = page.read_text("utf-8").replace(ENDPOINT, endpoint.rpartition("/")[2])
     for match in FENCE.finditer(text):
         language, content = (match[1] or "").removeprefix(CODE), match[2]
         options = OPTIONS.match(content)[0] if (match[1] or "").startswith(CODE) else ""
@@ -130,8 +130,12 @@ class Reader:
                 exec(compile("\n" * block.line + block.text, where, "exec"), self.scope)
             return out.getvalue()
         if block.text.startswith("crux serve "):
-            _, _, _, endpoint, *more = block.text.split()
-            self.servers.append(Served(endpoint, "--workers", "1", *more))
+            _, _, *flags = block.text.split()
+            routed = flags[:2] == ["-m", "client"]
+            _, endpoint, *more = flags[2:] if routed else flags
+            more += ["--workers", "1"]
+            server = Served(endpoint, *more, routed=routed, folder=self.folder)
+            self.servers.append(server)
             return ""
         done = subprocess.run(
             ["bash", "-c", PRELUDE + block.text],

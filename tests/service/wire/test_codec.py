@@ -5,6 +5,9 @@ from __future__ import annotations
 import itertools
 import json
 import random
+import subprocess
+import sys
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -15,6 +18,7 @@ from service.answering import dispatch
 from service.replies import ErrorReply, PlanReply
 from service.requests import PlanRequest, WrenchSpaceRequest
 from service.wire import Format, MalformedError, decode_request
+from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.replies import PLAN, check_answer
 from tests.suite.helpers.requests import (
     JSON,
@@ -144,3 +148,28 @@ def test_two_thousand_spoilt_requests_get_a_plan_or_an_error() -> None:
 def test_random_bytes_are_never_more_than_an_error(payload: bytes, form: str) -> None:
     answer = dispatch.handle(PLAN, payload, form)
     assert not answer.good
+
+
+def test_threads_may_be_the_first_to_decode_a_kind(tmp_path: Path) -> None:
+    """In msgspec alone, threads that are the first to decode a type crash the process."""
+    answer = dispatch.handle(PLAN, msgspec.msgpack.encode(wall_request()), MSGPACK)
+    file = tmp_path / "reply"
+    file.write_bytes(answer.payload)
+    code = f"""
+import sys, threading
+from service.replies import PlanReply
+from service.wire import Format
+sys.setswitchinterval(1e-6)
+data, begin, read = open({str(file)!r}, "rb").read(), threading.Barrier(8), []
+def decode():
+    begin.wait()
+    read.append(Format.MSGPACK.decode(data, PlanReply).status)
+threads = [threading.Thread(target=decode) for _ in range(8)]
+[thread.start() for thread in threads]
+[thread.join() for thread in threads]
+print(*read)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout.split()) == (0, ["optimal"] * 8)

@@ -7,6 +7,7 @@ import os
 import socket
 import subprocess
 import sys
+from pathlib import Path
 
 import zenoh
 
@@ -24,13 +25,15 @@ def free_endpoint() -> str:
 class Served:
     """A ``crux serve`` process, to which clients connect; or one that is a client of a router."""
 
-    def __init__(self, endpoint: str, *more: str, routed: bool = False) -> None:
+    def __init__(
+        self, endpoint: str, *more: str, routed: bool = False, folder: Path = ROOT
+    ) -> None:
         self.endpoint = endpoint
         linked = ["-m", "client", "-e"] if routed else ["-m", "peer", "-l"]
         flags = [*linked, endpoint, "--no-multicast-scouting", "--json", *more]
         self.process = subprocess.Popen(
             [sys.executable, "-m", "service.commands.cli", "serve", *flags],
-            cwd=ROOT,
+            cwd=folder,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             env=os.environ | {"PYTHONPATH": str(ROOT)},
