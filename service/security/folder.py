@@ -19,12 +19,12 @@ from service.security.rights import Role, access_control
 
 __all__ = ["KeyFolder", "NamedKey"]
 
-INDEX, AUTHORITY, AUTHORITY_KEY = "keys.json", "ca.pem", "ca-key.pem"
+INDEX_FILE, AUTHORITY_FILE, AUTHORITY_KEY = "keys.json", "ca.pem", "ca-key.pem"
 AUTHORITY_YEARS: Final = 10
 """How long an authority is valid, and the longest that a certificate can be."""
-LISTENING: Final = {Role.SERVICE: "peer", Role.ROUTER: "router"}
+MODES_BY_ROLE: Final = {Role.SERVICE: "peer", Role.ROUTER: "router"}
 """Zenoh mode of the roles to which others connect."""
-SECRET, PUBLIC = 0o600, 0o644
+SECRET_MODE, PUBLIC_MODE = 0o600, 0o644
 
 
 class NamedKey(msgspec.Struct, frozen=True, kw_only=True):
@@ -49,7 +49,7 @@ class NamedKey(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class _Index(msgspec.Struct, kw_only=True):
-    """What a folder's index says: robot, port, ROS domain, and all certificates."""
+    """Index of a folder: robot, port, ROS domain, and all certificates."""
 
     v: int = 1
     robot: str
@@ -78,15 +78,15 @@ class KeyFolder:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
-            self._index = msgspec.json.decode((path / INDEX).read_bytes(), type=_Index)
+            self._index = msgspec.json.decode((path / INDEX_FILE).read_bytes(), type=_Index)
         except OSError:
             raise InvalidInputError(
-                f"{path}: has no {INDEX}, so it is no folder of keys; crux keys make {path} makes "
-                "one",
+                f"{path}: has no {INDEX_FILE}, so it is no folder of keys; crux keys make {path} "
+                "makes one",
                 field="DIR",
             ) from None
         except msgspec.MsgspecError as error:
-            raise InvalidInputError(f"{path / INDEX}: {error}", field="DIR") from None
+            raise InvalidInputError(f"{path / INDEX_FILE}: {error}", field="DIR") from None
 
     @property
     def names(self) -> tuple[NamedKey, ...]:
@@ -130,10 +130,10 @@ class KeyFolder:
         end = _now() + datetime.timedelta(days=365 * AUTHORITY_YEARS)
         authority, key = Authority.made(f"crux {robot}", end)
         path.mkdir(mode=0o700, parents=True, exist_ok=True)
-        _write(path / AUTHORITY_KEY, key, SECRET)
-        _write(path / AUTHORITY, authority.certificate, PUBLIC)
+        _write(path / AUTHORITY_KEY, key, SECRET_MODE)
+        _write(path / AUTHORITY_FILE, authority.certificate, PUBLIC_MODE)
         index = _Index(robot=robot, port=port, domain=domain)
-        _write(path / INDEX, msgspec.json.encode(index), PUBLIC)
+        _write(path / INDEX_FILE, msgspec.json.encode(index), PUBLIC_MODE)
         folder = cls(path)
         folder.add("service", Role.SERVICE, hosts, days)
         folder.add("planner", Role.PLANNER, (), days)
@@ -181,8 +181,10 @@ class KeyFolder:
                 "these keys are for no ROS domain; make others with crux keys make DIR --domain N",
                 field="--role",
             )
-        if bool(hosts) != (role in LISTENING):
-            need = "needs the hosts at which it listens" if role in LISTENING else "has no hosts"
+        if bool(hosts) != (role in MODES_BY_ROLE):
+            need = (
+                "needs the hosts at which it listens" if role in MODES_BY_ROLE else "has no hosts"
+            )
             raise InvalidInputError(f"a {role} {need}", field="--host")
         for host in hosts:
             _check_host(host)
@@ -190,7 +192,7 @@ class KeyFolder:
         added = NamedKey(name=name, role=role, hosts=tuple(hosts), until=until)
         made = self._authority().certify(name, hosts, until)
         tls = {
-            "root_ca_certificate_base64": _base64((self.path / AUTHORITY).read_bytes()),
+            "root_ca_certificate_base64": _base64((self.path / AUTHORITY_FILE).read_bytes()),
             "enable_mtls": True,
             "verify_name_on_connect": True,
             "close_link_on_expiration": True,
@@ -205,9 +207,9 @@ class KeyFolder:
         if hosts:
             where = [f"tls/{_listening_address(hosts)}:{self._index.port}"]
             config |= {
-                "mode": LISTENING[role],
+                "mode": MODES_BY_ROLE[role],
                 # none in client mode
-                "listen": {"endpoints": dict.fromkeys(LISTENING.values(), where)},
+                "listen": {"endpoints": dict.fromkeys(MODES_BY_ROLE.values(), where)},
             }
         else:
             services = [each for each in self.names if each.role is Role.SERVICE]
@@ -218,7 +220,7 @@ class KeyFolder:
         changed = self._with_rights()
         if hosts:
             config["access_control"] = self._rights()
-        _write(self._file(name), self._text(added, config), SECRET)
+        _write(self._file(name), self._text(added, config), SECRET_MODE)
         self._write_all(changed)
         return list(changed)
 
@@ -247,12 +249,12 @@ class KeyFolder:
 
     def _authority(self) -> Authority:
         try:
-            certificate = (self.path / AUTHORITY).read_bytes()
+            certificate = (self.path / AUTHORITY_FILE).read_bytes()
             return Authority(certificate, (self.path / AUTHORITY_KEY).read_bytes())
         except OSError as error:
             raise InvalidInputError(
                 f"{error.filename}: {error.strerror}; a name is added where the authority's "
-                f"{AUTHORITY} and {AUTHORITY_KEY} are",
+                f"{AUTHORITY_FILE} and {AUTHORITY_KEY} are",
                 field="DIR",
             ) from None
 
@@ -271,7 +273,7 @@ class KeyFolder:
         for each in self.names:
             path = self._file(each.name)
             # one that was moved away keeps the rights that it has
-            if each.role in LISTENING and path.exists():
+            if each.role in MODES_BY_ROLE and path.exists():
                 text = re.sub(rb"(?m)^\s*//.*$", b"", path.read_bytes())
                 try:
                     config = msgspec.json.decode(text, type=dict[str, Any])
@@ -286,8 +288,12 @@ class KeyFolder:
 
     def _write_all(self, configurations: dict[Path, bytes]) -> None:
         for path, text in configurations.items():
-            _replace(path, text, SECRET)
-        _replace(self.path / INDEX, msgspec.json.format(msgspec.json.encode(self._index)), PUBLIC)
+            _replace(path, text, SECRET_MODE)
+        _replace(
+            self.path / INDEX_FILE,
+            msgspec.json.format(msgspec.json.encode(self._index)),
+            PUBLIC_MODE,
+        )
 
     def _text(self, key: NamedKey, config: dict[str, Any]) -> bytes:
         comment = (

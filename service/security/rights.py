@@ -17,7 +17,7 @@ __all__ = ["Role", "access_control"]
 
 
 class Role(StrEnum):
-    """What the owner of a certificate may do."""
+    """Role of the owner of a certificate: what it may do."""
 
     SERVICE = "service"
     """Answer questions, and publish set-points."""
@@ -33,7 +33,7 @@ class Role(StrEnum):
     """Do anything in one ROS domain, and nothing else."""
 
 
-LIVELINESS: Final = ("liveliness_query", "declare_liveliness_subscriber")
+LIVELINESS_MESSAGES: Final = ("liveliness_query", "declare_liveliness_subscriber")
 ALL_MESSAGES: Final = (
     "put",
     "delete",
@@ -42,7 +42,7 @@ ALL_MESSAGES: Final = (
     "reply",
     "declare_queryable",
     "liveliness_token",
-    *LIVELINESS,
+    *LIVELINESS_MESSAGES,
 )
 
 Rule = tuple[Sequence[str], Sequence[str]]
@@ -116,13 +116,13 @@ def _rights(role: Role, robot: str, domain: int | None) -> tuple[list[Rule], lis
     points = (stream_key(robot, "*", ServiceName.SET_POINTS),)
     play = (service_key(robot, ServiceName.PLAY),)
     observer: tuple[list[Rule], list[Rule]] = (
-        [(("query",), looks), (LIVELINESS, tokens)],
+        [(("query",), looks), (LIVELINESS_MESSAGES, tokens)],
         [(("reply", "declare_queryable"), looks), (("liveliness_token",), tokens)],
     )
     planner: tuple[list[Rule], list[Rule]] = (
         [
             (("query",), questions),
-            (LIVELINESS, tokens),
+            (LIVELINESS_MESSAGES, tokens),
             (("put",), wrenches),
             (("declare_subscriber",), (*points, *play)),
             (("reply", "declare_queryable", "liveliness_token"), clients),
@@ -132,22 +132,22 @@ def _rights(role: Role, robot: str, domain: int | None) -> tuple[list[Rule], lis
             (("liveliness_token",), tokens),
             (("declare_subscriber",), wrenches),
             (("put",), (*points, *play)),
-            (("query", *LIVELINESS), clients),
+            (("query", *LIVELINESS_MESSAGES), clients),
         ],
     )
     # what a planner sends a service, a service receives; and it looks for others of its kind
     service: tuple[list[Rule], list[Rule]] = (
         [
             (("reply", "declare_queryable"), questions),
-            (("liveliness_token", *LIVELINESS), tokens),
+            (("liveliness_token", *LIVELINESS_MESSAGES), tokens),
             (("declare_subscriber",), wrenches),
             (("put",), points),
-            (("query", *LIVELINESS), clients),
+            (("query", *LIVELINESS_MESSAGES), clients),
             *anything,
         ],
         [
             (("query",), questions),
-            (("liveliness_token", *LIVELINESS), tokens),
+            (("liveliness_token", *LIVELINESS_MESSAGES), tokens),
             (("put",), wrenches),
             (("declare_subscriber",), points),
             (("reply", "declare_queryable", "liveliness_token"), clients),

@@ -35,7 +35,7 @@ __all__ = ["HOW_TO_START", "Asker", "Identity", "Parts"]
 Parts = Callable[[PartReply], None]
 RETRY_AFTER: Final = 0.3
 """A service that has just come back needs so long until it is reached [s]."""
-SEARCH: Final = 1.0
+TOKEN_TIMEOUT: Final = 1.0
 """Longest wait for a service's token, to say why there is no answer [s]."""
 HOW_TO_START: Final = "start a service with `crux serve` where this session reaches it"
 
@@ -188,7 +188,7 @@ class Asker:
     def _unanswered(self, name: str) -> NoServiceError:
         """Return the error of a question that nobody answers, and why that may be."""
         key = service_key(self._robot, name)
-        if token_ids(self._session, service_key(self._robot, ServiceName.ALIVE), SEARCH):
+        if token_ids(self._session, service_key(self._robot, ServiceName.ALIVE), TOKEN_TIMEOUT):
             return NoServiceError(
                 f"a service of {self._robot} is there, but does not answer at {key}: this session "
                 "may have no right to ask there (see crux keys), or the service has just ended"

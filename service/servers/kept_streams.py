@@ -20,12 +20,12 @@ from service.wire import ServiceName, ServiceTimeout, read_reply
 
 __all__ = ["KeptStreams"]
 
-REMEMBERED: Final = 64
+REMEMBERED_STREAMS: Final = 64
 """Number of streams of a client of which it is known where they are kept: an LRU cache."""
 
 
 class _Kept:
-    """Where a stream is kept, by which identifier; and the declaration again that is in work."""
+    """Place of a stream: its service, its identifier there, and a declaration again in work."""
 
     def __init__(self, request: StreamRequest, stream: str, server: str) -> None:
         self.request, self.stream, self.server = request, stream, server
@@ -50,7 +50,7 @@ class KeptStreams:
     ) -> None:
         self._asker, self._declare, self._renew = asker, declare, renew
         self._lock = threading.Lock()
-        self._kept: LRUCache[str, _Kept] = LRUCache(REMEMBERED)
+        self._kept: LRUCache[str, _Kept] = LRUCache(REMEMBERED_STREAMS)
 
     def declare(self, request: StreamRequest) -> tuple[StreamReply, str]:
         """Declare a stream; return the reply, and the identifier of the service that keeps it."""

@@ -16,7 +16,7 @@ from service.wire import server_key
 
 __all__ = ["LiveServers"]
 
-DOUBTED: Final = 10.0
+DOUBT_TIME: Final = 10.0
 """How long a service that did not answer in time is asked only if there is no other [s]: until then
 zenoh has seen that a machine is gone, by the lease of its link."""
 
@@ -123,4 +123,4 @@ class LiveServers:
         """Record that a service has not answered in time."""
         with self._changed:
             if server in self._servers:
-                self._servers[server].doubted_until = time.monotonic() + DOUBTED
+                self._servers[server].doubted_until = time.monotonic() + DOUBT_TIME

@@ -288,8 +288,11 @@ class CruxClient:
         request, name = CancelRequest(v=1, id=identifier), ServiceName.CANCEL
         waits = self.timeout or SERVING_SETTINGS.client_timeout
         servers = () if self._servers is None else self._servers.names()
-        # any of them may have the question
-        replies = [self._asker.ask_one(each, name, request, waits) for each in servers]
+        replies = []
+        for each in servers:
+            # any of them may have the question, also if another has just ended
+            with suppress(CruxError):
+                replies.append(self._asker.ask_one(each, name, request, waits))
         if not any(replies):
             replies = [self._asker.ask(name, request, waits)]
         samples = [each.ok for each in replies if each is not None and each.ok is not None]

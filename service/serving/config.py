@@ -36,7 +36,7 @@ __all__ = [
 log = logging.getLogger(__name__)
 
 SESSION_MODES: Final = ("peer", "client", "router")
-SECRETS: Final = tuple(
+TLS_SECRETS: Final = tuple(
     f"transport/link/tls/{name}_base64"
     for name in (
         "root_ca_certificate",
@@ -155,7 +155,7 @@ def patient(config: zenoh.Config, seconds: float) -> zenoh.Config:
         Timeout of connecting and of searching, in client mode [s].
     """
     copy = zenoh.Config.from_json5(str(config))
-    for name in SECRETS:
+    for name in TLS_SECRETS:
         # these zenoh leaves out of the text of a configuration
         if msgspec.json.decode(value := config.get_json(name)) is not None:
             copy.insert_json5(name, value)
