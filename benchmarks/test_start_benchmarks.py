@@ -15,7 +15,7 @@ from tests.suite.helpers.checkout import ROOT
 
 pytestmark = pytest.mark.slow
 
-COMMAND = "from service.commands import main; main()"
+COMMAND = "from service.__main__ import main; main()"
 
 
 def children() -> float:

@@ -23,7 +23,7 @@ def main() -> None:
     """Let the command draw its three views in one row, and write them in two."""
     with TemporaryDirectory() as folder:
         row = Path(folder) / "row.png"
-        run = "from service.commands import main; main()"
+        run = "from service.__main__ import main; main()"
         subprocess.run([sys.executable, "-c", run, *ASKED, "--plot", str(row)], check=True)
         image = plt.imread(row)
     height, width, _ = image.shape

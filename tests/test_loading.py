@@ -14,7 +14,7 @@ from service.commands.cli import COMMANDS_BY_NAME, crux
 from tests.suite.helpers.checkout import ROOT
 
 HEAVY = ("scipy", "trimesh", "cvxpy", "pinocchio", "matplotlib", "numba")
-COMMAND = "from service.commands import main; main()"
+COMMAND = "from service.__main__ import main; main()"
 
 
 def loaded(code: str, *arguments: str, env: dict[str, str] | None = None) -> set[str]:

@@ -90,7 +90,7 @@ class Run:
         self.sizes: list[int] = []
         self._process = subprocess.Popen(
             [
-                *(sys.executable, "-c", "from service.commands import main; main()"),
+                *(sys.executable, "-c", "from service.__main__ import main; main()"),
                 *("batch", str(requests), "-o", str(table), *flags),
             ],
             cwd=ROOT,

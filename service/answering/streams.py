@@ -229,6 +229,16 @@ class Streams:
         reply.id = request.id
         return reply
 
+    def settle(self, identifier: str) -> None:
+        """Wait until a stream has solved the plans that it interpolates between from now on.
+
+        Set-points then depend only on the wrenches before. An unknown identifier is ignored.
+        """
+        with self._lock:
+            kept = self._kept.get(identifier)
+        if kept is not None:
+            kept.stream.wait()
+
     def release(self, identifier: str) -> None:
         """Close the stream of an identifier; an unknown identifier is ignored."""
         with self._lock:

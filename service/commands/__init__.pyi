@@ -1,1 +1,1 @@
-from .entry import main as main
+from .cli import run_command_line as run_command_line

@@ -65,7 +65,7 @@ COMMANDS_BY_NAME: Final = {
         "Propose holds on ROCK, a mesh in metres (of a scan, `crux rock` makes one).",
     ),
     "keys": Entry(
-        "network",
+        "keys",
         "Make certificates and rights: who may ask a service, and who may only watch it.",
     ),
     "new": Entry(
@@ -82,6 +82,10 @@ COMMANDS_BY_NAME: Final = {
         "plans",
         "Plan without each tile, finger and hand, one at a time, without moving.",
     ),
+    "replay": Entry(
+        "network",
+        "Ask all questions of a recording again, and say what has moved in the answers.",
+    ),
     "rock": Entry(
         "rock",
         "Make a mesh hold of a scan: points, a grid of heights, or triangles.",
@@ -90,7 +94,7 @@ COMMANDS_BY_NAME: Final = {
         "routes",
         "Plan climbs: every stage, and every move between two stages.",
     ),
-    "schema": Entry("network", "Print the JSON Schema of every message."),
+    "schema": Entry("plans", "Print the JSON Schema of every message."),
     "screen": Entry(
         "spaces",
         "Rank stances by their load factors; solve only those that may be the best.",
@@ -114,6 +118,10 @@ COMMANDS_BY_NAME: Final = {
     "sweep": Entry(
         "sweep",
         "Plan a stance over varied fields: a table, a picture, and where it stops holding.",
+    ),
+    "top": Entry(
+        "network",
+        "Show what a running service does: clients, queue, workers, streams, times.",
     ),
     "view": Entry(
         "live",
@@ -289,6 +297,6 @@ def crux() -> None:
 _say_more_or_less(crux)
 
 if __name__ == "__main__":
-    from service.commands import main
+    from service.__main__ import main
 
     main()

@@ -1,4 +1,4 @@
-"""Define commands that go on until the end: ``crux stream`` lines, ``play``, ``view`` a page."""
+"""Define commands that go on: ``crux stream`` and ``play`` give set-points, ``view`` a page."""
 
 from __future__ import annotations
 
@@ -96,81 +96,6 @@ def stream_command(stance: str, radius: float, own: options.Own, as_json: bool) 
     return worst
 
 
-@click.command("play")
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@zenoh_options
-@click.option(
-    "--rate",
-    type=options.FiniteRange(1.0, 1e4),
-    default=100.0,
-    show_default=True,
-    metavar="HZ",
-    help="Least number of set-points in a second.",
-)
-@click.option(
-    "--speed",
-    type=options.FiniteRange(0.0, min_open=True, max=100.0),
-    default=1.0,
-    show_default=True,
-    help="Time of the climb over time that passes; 1 keeps the controller's rates.",
-)
-@click.option("--up-to-failure", is_flag=True, help="Play a climb that ends in the middle, too.")
-@click.option(
-    "--wait",
-    type=options.FiniteRange(0.0, 1e6),
-    metavar="SECONDS",
-    help="Wait so long for a subscriber, the robot's controller; by default "
-    f"{serving.SERVING_SETTINGS.search_timeout:g}.",
-)
-@options.json_option
-def play_command(
-    folder: Path,
-    config: zenoh.Config,
-    rate: float,
-    speed: float,
-    up_to_failure: bool,
-    wait: float | None,
-    as_json: bool,
-) -> None:
-    """Send the set-points of a climb to a robot: publish them in time, until the end or Ctrl-C.
-
-    DIR is what crux route has written. Between knots, set-points are interpolated. Each is a
-    message at crux/<robot>/play; the last one comes again with the state done, or stopped. The
-    robot has to be at the start of the climb.
-    """
-    knots, about = bulk.read_climb(folder)
-    failure = about.climb.failure
-    if failure is not None and not up_to_failure:
-        raise InvalidInputError(
-            f"{folder}: the climb fails in move {failure.move} ({failure.phase}): "
-            f"{failure.reason}; --up-to-failure plays what comes before",
-            field="DIR",
-        )
-    if unsure := [knot.index for knot in knots if not knot.verified]:
-        raise InvalidInputError(f"{folder}: knot {unsure[0]} is not verified", field="DIR")
-    duration = knots[-1].time - knots[0].time
-    if not as_json:
-        tables.remark(f"playing {about.route}: {len(knots)} knots in {duration / speed:.1f} s")
-        if speed > 1.0:
-            tables.note(f"at speed {speed:g}, tensions and joints exceed the controller's rates")
-    serving.start_zenoh_log()
-    with serving.open_session(config) as session:
-        delays = [0.0]
-        sent = serving.play(
-            session, about.robot, knots, rate=rate, speed=speed, wait=wait, late=delays.append
-        )
-    # a controller hardly feels less than a period, or 10 ms
-    if not as_json and max(delays) > max(1.0 / rate, 0.01):
-        tables.note(
-            f"set-points were late, one of them by {1e3 * max(delays):.0f} ms: the climb took "
-            f"{sum(delays):.2f} s longer; try a lower --rate, or a machine with less to do"
-        )
-    if as_json:
-        tables.say({"v": 1, "set_points": sent, "knots": len(knots), "time": duration})
-    else:
-        tables.console().print(f"{sent} set-points of {len(knots)} knots were published")
-
-
 @click.command("view")
 @options.stance_argument
 @click.option(
@@ -247,6 +172,81 @@ def view_command(
         finally:
             live.close()
     return tables.ExitStatus.DONE
+
+
+@click.command("play")
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@zenoh_options
+@click.option(
+    "--rate",
+    type=options.FiniteRange(1.0, 1e4),
+    default=100.0,
+    show_default=True,
+    metavar="HZ",
+    help="Least number of set-points in a second.",
+)
+@click.option(
+    "--speed",
+    type=options.FiniteRange(0.0, min_open=True, max=100.0),
+    default=1.0,
+    show_default=True,
+    help="Time of the climb over time that passes; 1 keeps the controller's rates.",
+)
+@click.option("--up-to-failure", is_flag=True, help="Play a climb that ends in the middle, too.")
+@click.option(
+    "--wait",
+    type=options.FiniteRange(0.0, 1e6),
+    metavar="SECONDS",
+    help="Wait so long for a subscriber, the robot's controller; by default "
+    f"{serving.SERVING_SETTINGS.search_timeout:g}.",
+)
+@options.json_option
+def play_command(
+    folder: Path,
+    config: zenoh.Config,
+    rate: float,
+    speed: float,
+    up_to_failure: bool,
+    wait: float | None,
+    as_json: bool,
+) -> None:
+    """Send the set-points of a climb to a robot: publish them in time, until the end or Ctrl-C.
+
+    DIR is what crux route has written. Between knots, set-points are interpolated. Each is a
+    message at crux/<robot>/play; the last one comes again with the state done, or stopped. The
+    robot has to be at the start of the climb.
+    """
+    knots, about = bulk.read_climb(folder)
+    failure = about.climb.failure
+    if failure is not None and not up_to_failure:
+        raise InvalidInputError(
+            f"{folder}: the climb fails in move {failure.move} ({failure.phase}): "
+            f"{failure.reason}; --up-to-failure plays what comes before",
+            field="DIR",
+        )
+    if unsure := [knot.index for knot in knots if not knot.verified]:
+        raise InvalidInputError(f"{folder}: knot {unsure[0]} is not verified", field="DIR")
+    duration = knots[-1].time - knots[0].time
+    if not as_json:
+        tables.remark(f"playing {about.route}: {len(knots)} knots in {duration / speed:.1f} s")
+        if speed > 1.0:
+            tables.note(f"at speed {speed:g}, tensions and joints exceed the controller's rates")
+    serving.start_zenoh_log()
+    with serving.open_session(config) as session:
+        delays = [0.0]
+        sent = serving.play(
+            session, about.robot, knots, rate=rate, speed=speed, wait=wait, late=delays.append
+        )
+    # a controller hardly feels less than a period, or 10 ms
+    if not as_json and max(delays) > max(1.0 / rate, 0.01):
+        tables.note(
+            f"set-points were late, one of them by {1e3 * max(delays):.0f} ms: the climb took "
+            f"{sum(delays):.2f} s longer; try a lower --rate, or a machine with less to do"
+        )
+    if as_json:
+        tables.say({"v": 1, "set_points": sent, "knots": len(knots), "time": duration})
+    else:
+        tables.console().print(f"{sent} set-points of {len(knots)} knots were published")
 
 
 def _declared(plan: requests.PlanRequest, radius: float) -> requests.StreamRequest:

@@ -1,4 +1,4 @@
-"""Define the commands of the service on zenoh: serve, keys, query, schema."""
+"""Define the commands of a service: serve, query, top, and replay of what was recorded."""
 
 from __future__ import annotations
 
@@ -6,29 +6,51 @@ import gc
 import logging
 import os
 import signal
+import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import msgspec
 
+import planner
 from hand_models.base import InvalidInputError
-from service import processes, requests, security, serving, tables, wire
+from service import (
+    operating,
+    processes,
+    recording,
+    requests,
+    ros2 as ros,
+    serving,
+    tables,
+    wire,
+)
 from service.commands import options, stances
-from service.ros2 import ros_domain
 
 if TYPE_CHECKING:
     import zenoh
 
-__all__ = [
-    "keys_command",
-    "query_command",
-    "schema_command",
-    "serve_command",
-    "zenoh_options",
-]
+__all__ = ["query_command", "replay_command", "serve_command", "top_command"]
+
+
+def _configuration(
+    context: click.Context, _: click.Parameter, paths: tuple[Path, ...]
+) -> Path | None:
+    """Return zenoh's file; take options of ``crux serve`` from a TOML file."""
+    zenoh_files = [path for path in paths if path.suffix != ".toml"]
+    option_files = [path for path in paths if path.suffix == ".toml"]
+    if option_files and context.command.name != "serve":
+        raise click.BadParameter(f"{option_files[0]}: only crux serve takes options from TOML")
+    if len(option_files) > 1:
+        raise click.BadParameter(f"one TOML file at most, got {', '.join(map(str, option_files))}")
+    named = None
+    for path in option_files:
+        found = operating.read_options(path, context, frozenset({"help", "check"}))
+        context.default_map = found
+        (named,) = found.pop("file", None) or (None,)
+    return zenoh_files[-1] if zenoh_files else None if named is None else Path(named)
 
 
 def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -46,7 +68,14 @@ def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
     @click.option("-e", "--connect", multiple=True, metavar="ENDPOINT", help="Connect to it.")
     @click.option("-l", "--listen", multiple=True, metavar="ENDPOINT", help="Listen on it.")
     @click.option(
-        "-c", "--config", "file", type=click.Path(path_type=Path), help="Zenoh JSON5 configuration."
+        "-c",
+        "--config",
+        "file",
+        type=click.Path(path_type=Path),
+        multiple=True,
+        is_eager=True,
+        callback=_configuration,
+        help="Zenoh JSON5 configuration; of crux serve also a TOML file with these options.",
     )
     @click.option("--cfg", "settings", multiple=True, metavar="KEY:VALUE", help="One setting.")
     @click.option("--no-multicast-scouting", is_flag=True, help="Look for nobody by multicast.")
@@ -89,6 +118,19 @@ def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
     type=click.IntRange(0, 232),
     help="ROS domain of --ros2; by default that of ROS_DOMAIN_ID, or 0.",
 )
+@click.option(
+    "--record",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.mcap",
+    help="Record questions and answers there; if the file exists, in FILE-2.mcap, and so on.",
+)
+@click.option(
+    "--record-limit",
+    type=options.FiniteRange(0.01, 1e6),
+    metavar="GB",
+    help="Of all files of --record together: the oldest are deleted.",
+)
+@click.option("--check", is_flag=True, help="Say what would be served, and start nothing.")
 @options.json_option
 def serve_command(
     config: zenoh.Config,
@@ -99,16 +141,49 @@ def serve_command(
     log_format: str,
     ros2: bool,
     domain: int | None,
+    record: Path | None,
+    record_limit: float | None,
+    check: bool,
     as_json: bool,
 ) -> None:
     """Answer questions on zenoh until SIGTERM or Ctrl-C.
 
-    Without -l only programs on this machine can ask. The hand of --hand is that of every question;
-    numbers that a question gives replace the hand's. The robot of --robot is the only one that is
-    planned for, and gives the keys its name.
+    Without -l only programs on this machine can ask. A file -c FILE.toml has options by their
+    names, such as metrics-port = 9100; those of the command line replace them. The hand of --hand
+    is that of every question; numbers that a question gives replace the hand's. The robot of
+    --robot is the only one that is planned for, and gives the keys its name.
     """
     if domain is not None and not ros2:
         raise InvalidInputError("has no meaning without --ros2; give both", field="--domain")
+    if record_limit is not None and record is None:
+        raise InvalidInputError("has no meaning without --record", field="--record-limit")
+    if record is not None and record.suffix != ".mcap":
+        raise InvalidInputError(f"must end in .mcap, got {record}", field="--record")
+    ros_number = ros.ros_domain(domain) if ros2 else None
+    if check:
+        serving.closed(config)
+        endpoints = serving.listening(config)
+        operating.check_endpoints(endpoints, metrics_port)
+        if record is not None:
+            operating.check_recording(record)
+        (robot,) = own.robots
+        if ros_number is not None:
+            ros.check_node(robot, ros_number)
+        count = max(2, planner.cores()) if workers is None else workers
+        _say_checked(
+            {
+                "keys": serving.service_keys(robot),
+                "listen": endpoints,
+                "open to the network": serving.exposed(config),
+                "workers": count,
+                "deadline": seconds,
+                "metrics": None if metrics_port is None else f"127.0.0.1:{metrics_port}",
+                "ros domain": ros_number,
+                "record": None if record is None else str(record),
+            },
+            as_json,
+        )
+        return
     stop = _StopSignal()
     # a client that does not read blocks one of these threads while zenoh waits for it
     threads = "(rx: (worker_threads: 4), net: (worker_threads: 4), tx: (worker_threads: 4))"
@@ -123,14 +198,21 @@ def serve_command(
     serving.start_zenoh_log()
     serving.closed(config)
     endpoints = serving.listening(config)
-    with serving.ended_in_time(serving.open_session(config)) as session:
+    with serving.ended_in_time(serving.open_session(config)) as session, ExitStack() as stack:
+        recorder = None
+        if record is not None:
+            (robot,) = own.robots
+            limit = None if record_limit is None else round(1e9 * record_limit)
+            recorder = recording.Recorder(record, robot, own.hand, limit)
+            stack.callback(recorder.close)
         service = serving.PlanService(
             session,
             own.robot,
             own.hand,
             workers=workers,
             seconds=seconds,
-            ros_domain=ros_domain(domain) if ros2 else None,
+            ros_domain=ros_number,
+            recorder=recorder,
         )
         if metrics_port is not None:
             service.serve_metrics(metrics_port)
@@ -154,7 +236,18 @@ def serve_command(
                     f"{', '.join(open_to)}: whoever reaches it can ask, and read what zenoh "
                     "publishes about this session (@/**); access control is zenoh's (-c FILE)"
                 )
-            stop.wait()
+            with operating.supervised(service.is_alive):
+                stop.wait()
+
+
+def _say_checked(found: dict[str, Any], as_json: bool) -> None:
+    """Print what would be served."""
+    if as_json:
+        tables.say({"v": 1} | {key.replace(" ", "_"): value for key, value in found.items()})
+        return
+    for word, value in found.items():
+        text = ", ".join(map(str, value)) if isinstance(value, list | tuple) else value
+        tables.console().print(f"{word}: {'none' if text in (None, '') else text}", markup=False)
 
 
 class _StopSignal:
@@ -220,127 +313,77 @@ def query_command(
     return tables.show(reply, as_json)
 
 
-@click.group("keys")
-def keys_command() -> None:
-    """Make certificates and rights: who may ask a service, and who may only watch it.
-
-    DIR is the folder that crux keys make makes. It has a zenoh configuration for each name, for -c
-    of crux serve and of all clients.
-    """
-
-
-folder_argument = click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-hosts_option = click.option(
-    "--host",
-    "hosts",
-    multiple=True,
-    metavar="HOST",
-    help="Name or address of the machine that listens, as others reach it; may be repeated.",
-)
-days_option = click.option(
-    "--days",
-    type=click.IntRange(1, 3650),
-    default=365,
-    show_default=True,
-    help="Validity of the certificates.",
-)
-
-
-@keys_command.command("make")
-@folder_argument
-@hosts_option
-@click.option("--port", type=click.IntRange(1, 65535), default=7447, show_default=True)
-@days_option
+@click.command("top")
+@zenoh_options
+@options.robot_option
 @click.option(
-    "--robot",
-    default=wire.DEFAULT_ROBOT,
+    "--interval",
+    type=options.FiniteRange(0.1, 3600.0),
+    default=2.0,
     show_default=True,
-    metavar="NAME",
-    help="Robot for whose keys the rights are.",
+    metavar="SECONDS",
+    help="Between two looks at the service.",
 )
-@click.option(
-    "--domain",
-    type=click.IntRange(0, 232),
-    help="ROS domain of crux serve --ros2; its nodes get a certificate, too.",
-)
+@click.option("--once", is_flag=True, help="Look once: all questions since the service's start.")
 @options.json_option
-def make_command(
-    folder: Path,
-    hosts: tuple[str, ...],
-    port: int,
-    days: int,
-    robot: str,
-    domain: int | None,
+def top_command(
+    config: zenoh.Config,
+    robot: planner.RobotFile | None,
+    interval: float,
+    once: bool,
     as_json: bool,
 ) -> None:
-    """Make an authority, and keys of a service, a planner and an observer.
+    """Show what a running service does, until Ctrl-C: clients, queue, workers, streams, times.
 
-    Without --host, they are for this machine alone.
+    Rates, errors and times are those since the look before. p50 and p99 are quantiles; they are
+    estimated from times that are counted in buckets.
     """
-    where = hosts or ("localhost", "127.0.0.1")
-    made = security.KeyFolder.make(folder, robot, where, port, days, domain)
-    _tell_names(made, as_json)
-    tables.remark(f"{folder}/ca-key.pem makes further names: keep it where nobody else reads it")
+    from rich.live import Live
+
+    serving.start_zenoh_log()
+    name = wire.DEFAULT_ROBOT if robot is None else robot.name
+    timeout = serving.SERVING_SETTINGS.client_timeout
+    with serving.open_session(config) as session:
+        now = operating.read_snapshot(session, name, timeout)
+        if once and not as_json:
+            tables.console().print(operating.draw_top(now))
+            return
+        shown = Live(console=tables.console(), auto_refresh=False, screen=not as_json)
+        with ExitStack() as stack:
+            if not as_json:
+                stack.enter_context(shown)
+            before = None
+            while True:
+                if as_json:
+                    tables.say(operating.top_json(now, before))
+                else:
+                    shown.update(operating.draw_top(now, before), refresh=True)
+                if once:
+                    return
+                time.sleep(interval)
+                before, now = now, operating.read_snapshot(session, name, timeout)
 
 
-@keys_command.command("add")
-@folder_argument
-@click.argument("name", metavar="NAME")
-@click.option("--role", type=click.Choice([*map(str, security.Role)]), required=True)
-@hosts_option
-@days_option
+@click.command("replay")
+@click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
+@options.own_options
 @options.json_option
-def add_command(
-    folder: Path, name: str, role: str, hosts: tuple[str, ...], days: int, as_json: bool
-) -> None:
-    """Make the key of another name, and give it the rights of its role."""
-    keys = security.KeyFolder(folder)
-    changed = keys.add(name, security.Role(role), hosts, days)
-    _tell_names(keys, as_json)
-    _tell_changed(changed)
+def replay_command(file: Path, own: options.Own, as_json: bool) -> int:
+    """Ask all questions of a recording again, here, and say what has moved in the answers.
 
-
-@keys_command.command("remove")
-@folder_argument
-@click.argument("name", metavar="NAME")
-@options.json_option
-def remove_command(folder: Path, name: str, as_json: bool) -> None:
-    """Take all rights from a name, and remove its configuration."""
-    keys = security.KeyFolder(folder)
-    changed = keys.remove(name)
-    _tell_names(keys, as_json)
-    _tell_changed(changed)
-
-
-@keys_command.command("list")
-@folder_argument
-@options.json_option
-def list_command(folder: Path, as_json: bool) -> None:
-    """List names, roles, hosts, and until when they are valid."""
-    _tell_names(security.KeyFolder(folder), as_json)
-
-
-def _tell_names(keys: security.KeyFolder, as_json: bool) -> None:
+    FILE is one of crux serve --record. Answers are compared to the digit, without identifiers and
+    times on a clock. The exit status is 3 if an answer has moved. The hand is the recorded
+    service's unless --hand gives another; of a robot of your own, give --robot again.
+    """
+    recorded = recording.Recording(file)
+    replay = recording.Replay(recorded, own.robots, own.hand)
+    with tables.progress("replaying", line=f"replaying {file}") as step:
+        for _ in replay.run(recorded.questions(step)):
+            pass
+    if recorded.whole is False:
+        tables.note(f"{file} was cut off; all that is whole in it has been replayed")
     if as_json:
-        tables.say({"v": 1, "folder": str(keys.path), "names": keys.names})
-        return
-    for each in keys.names:
-        hosts = f", at {', '.join(each.hosts)}" if each.hosts else ""
-        line = f"{keys.path / each.name}.json5: {each.role}, until {each.until:%Y-%m-%d}{hosts}"
-        tables.console().print(line, soft_wrap=True, highlight=False)
-
-
-def _tell_changed(changed: list[Path]) -> None:
-    if changed:
-        tables.remark(
-            f"changed: {', '.join(map(str, changed))}; copy them to their machines and start those "
-            "services anew: the rights are read at the start"
-        )
-
-
-@click.command("schema")
-@options.json_option
-def schema_command(as_json: bool) -> None:
-    """Print the JSON Schema of every message."""
-    text = msgspec.json.encode(wire.schema())
-    click.echo(text if as_json else msgspec.json.format(text))
+        tables.say(operating.replay_json(replay))
+    else:
+        operating.print_replay(replay, tables.console())
+    return tables.ExitStatus.OVERLOADED if replay.moved else tables.ExitStatus.DONE

@@ -1,4 +1,4 @@
-"""Define ``crux plan``, ``redundancy``, ``demo`` and ``new``: stances, on this machine alone."""
+"""Define ``crux plan``, ``redundancy``, ``new``, ``demo`` and ``schema``, which need no service."""
 
 from __future__ import annotations
 
@@ -16,7 +16,13 @@ from hand_models.base import InvalidInputError, whole_file
 from service import answering, replies, requests, serving, tables, wire
 from service.commands import options, stances
 
-__all__ = ["demo_command", "new_command", "plan_command", "redundancy_command"]
+__all__ = [
+    "demo_command",
+    "new_command",
+    "plan_command",
+    "redundancy_command",
+    "schema_command",
+]
 
 
 @click.command("plan")
@@ -123,6 +129,79 @@ def plan_command(
     else:
         _print_files(written, answer.reply)
     return tables.ExitStatus.of(answer.reply.status)
+
+
+@click.command("demo")
+@click.option(
+    "-o",
+    "--output",
+    "picture",
+    type=options.OutputFile(*options.PICTURE_ENDINGS),
+    default="crux-demo.png",
+    show_default=True,
+    metavar="FILE",
+    help="Where the picture goes.",
+)
+@click.option(
+    "--climb",
+    "folder",
+    is_flag=False,
+    flag_value="crux-climb",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="[DIR]",
+    help="Search for a climb on the bundled knob-wall instead; where its files go.",
+)
+@options.page_option
+@options.own_options
+@options.json_option
+def demo_command(
+    picture: Path, folder: Path | None, page: Path | None, own: options.Own, as_json: bool
+) -> int:
+    """Start the service, ask it for a plan of a real stance, and draw the answer.
+
+    A robot of --robot whose limbs do not reach that stance's holds is planned for without joints.
+    """
+    if folder is not None:
+        from service import climbs
+        from service.commands.routes import search_climb
+
+        asked = own.asked(climbs.demo_request())
+        return search_climb(asked, folder, options.WorkersOption(None, None), own, as_json, page)
+    tables.write_alone(picture)
+    request = options.with_extras(own.asked(stances.read_request("wall-300-joints")))
+    serving.start_zenoh_log()
+    config = serving.zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
+    with (
+        serving.open_session(config) as session,
+        serving.PlanService(session, own.robot, workers=1) as service,
+    ):
+        # [s] its own service answers, also on a busy machine
+        client = serving.CruxClient(session, service.robot, timeout=120.0)
+        try:
+            reply = client.plan(request)
+        except wire.ServiceError as error:
+            if error.kind != "unreachable":
+                raise
+            tables.remark(f"planned without joints: {error.message}")
+            stance = msgspec.structs.replace(request.stance, joints=None)
+            request = msgspec.structs.replace(request, stance=stance)
+            reply = client.plan(request)
+    answer = answering.planned(request, own.robots)
+    tables.write_plan_picture(answer, picture)
+    if page is not None:
+        tables.write_answer_page(answer, page, "wall-300-joints")
+    status = tables.show(reply, as_json)
+    if not as_json:
+        tables.console().print(f"picture: {picture}")
+    return status
+
+
+@click.command("schema")
+@options.json_option
+def schema_command(as_json: bool) -> None:
+    """Print the JSON Schema of every message."""
+    text = msgspec.json.encode(wire.schema())
+    click.echo(text if as_json else msgspec.json.format(text))
 
 
 @click.command("redundancy")
@@ -262,71 +341,6 @@ def _without_palm_loads(answer: answering.Planned) -> planner.PalmLoadFactors | 
         return planner.load_factors_without_palm_loads(answer.question)
     except planner.DeadlineError:
         return None
-
-
-@click.command("demo")
-@click.option(
-    "-o",
-    "--output",
-    "picture",
-    type=options.OutputFile(*options.PICTURE_ENDINGS),
-    default="crux-demo.png",
-    show_default=True,
-    metavar="FILE",
-    help="Where the picture goes.",
-)
-@click.option(
-    "--climb",
-    "folder",
-    is_flag=False,
-    flag_value="crux-climb",
-    type=click.Path(path_type=Path, file_okay=False),
-    metavar="[DIR]",
-    help="Search for a climb on the bundled knob-wall instead; where its files go.",
-)
-@options.page_option
-@options.own_options
-@options.json_option
-def demo_command(
-    picture: Path, folder: Path | None, page: Path | None, own: options.Own, as_json: bool
-) -> int:
-    """Start the service, ask it for a plan of a real stance, and draw the answer.
-
-    A robot of --robot whose limbs do not reach that stance's holds is planned for without joints.
-    """
-    if folder is not None:
-        from service import climbs
-        from service.commands.routes import search_climb
-
-        asked = own.asked(climbs.demo_request())
-        return search_climb(asked, folder, options.WorkersOption(None, None), own, as_json, page)
-    tables.write_alone(picture)
-    request = options.with_extras(own.asked(stances.read_request("wall-300-joints")))
-    serving.start_zenoh_log()
-    config = serving.zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
-    with (
-        serving.open_session(config) as session,
-        serving.PlanService(session, own.robot, workers=1) as service,
-    ):
-        # [s] its own service answers, also on a busy machine
-        client = serving.CruxClient(session, service.robot, timeout=120.0)
-        try:
-            reply = client.plan(request)
-        except wire.ServiceError as error:
-            if error.kind != "unreachable":
-                raise
-            tables.remark(f"planned without joints: {error.message}")
-            stance = msgspec.structs.replace(request.stance, joints=None)
-            request = msgspec.structs.replace(request, stance=stance)
-            reply = client.plan(request)
-    answer = answering.planned(request, own.robots)
-    tables.write_plan_picture(answer, picture)
-    if page is not None:
-        tables.write_answer_page(answer, page, "wall-300-joints")
-    status = tables.show(reply, as_json)
-    if not as_json:
-        tables.console().print(f"picture: {picture}")
-    return status
 
 
 @click.command("new")

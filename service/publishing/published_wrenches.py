@@ -18,9 +18,10 @@ import zenoh
 from zenoh.handlers import Callback
 
 from hand_models.base import LimitError
+from service.recording import Exchange
 from service.replies import ErrorReply, PublishedReply, SetPointsReply
 from service.requests import WrenchRequest
-from service.wire import Format, MalformedError, ServiceName, check_size, stream_key
+from service.wire import Answer, Format, MalformedError, ServiceName, check_size, stream_key
 
 __all__ = ["PublishedWrench", "PublishedWrenches"]
 
@@ -30,6 +31,10 @@ class _Head(msgspec.Struct):
 
     number: int | None = None
     time: float | None = None
+
+
+class _Status(msgspec.Struct):
+    status: str = ""
 
 
 class _Arrival(NamedTuple):
@@ -119,6 +124,7 @@ class PublishedWrench:
         """
         self._begun = True
         if found := self._among.begin(self.stream):
+            self._among.recorded(self.stream, self._sample, self.arrived, None)
             self._sample, self.arrived, late = found
             self._skipped += 1 + late
         return self
@@ -136,14 +142,15 @@ class PublishedWrench:
         """
         # they are encoded already
         points = cast(SetPointsReply, msgspec.Raw(payload))
-        self._publish(encoding, set_points=points)
+        head = Format.named(encoding).decode(payload, _Status) if self._among.record else _Status()
+        self._publish(encoding, head.status, set_points=points)
 
     def reply_err(self, payload: bytes, *, encoding: str) -> None:
         """Publish an error, an encoded `ErrorReply`; parameters as for `reply`."""
         error = Format.named(encoding).decode(payload, ErrorReply).error
-        self._publish(encoding, error=error)
+        self._publish(encoding, error.kind, error=error)
 
-    def _publish(self, encoding: str, **content: Any) -> None:
+    def _publish(self, encoding: str, status: str, **content: Any) -> None:
         form = Format.named(encoding)
         try:
             given = Format.named(str(self.encoding))
@@ -159,7 +166,9 @@ class PublishedWrench:
             server=self._among.server,
             **content,
         )
-        self._among.publish(self.stream, form.encode(message), form.label(message))
+        answer = Answer(form.encode(message), form.label(message), status=status)
+        self._among.recorded(self.stream, self._sample, self.arrived, answer)
+        self._among.publish(self.stream, answer.payload, answer.encoding)
 
     def __enter__(self) -> Self:
         return self
@@ -185,11 +194,14 @@ class PublishedWrenches:
     ----------
     server : str
         Identifier of the service's session.
+    record : callable or None
+        Takes each wrench and its answer, to be recorded.
     """
 
     def __init__(self, session: zenoh.Session, robot: str) -> None:
         self._session, self._robot = session, robot
         self.server = str(session.info.zid())
+        self.record: Callable[[Exchange], None] | None = None
         self._ask: Ask | None = None
         self._subscribers: list[Any] = []
         self._lock = threading.Lock()
@@ -266,6 +278,8 @@ class PublishedWrenches:
         with self._lock:
             known = self._streams.setdefault(stream, _Incoming())
             replaced = known.newest
+            if replaced is not None:
+                self.recorded(stream, replaced.sample, replaced.at, None)
             known.newest = _Arrival(sample, now, 0 if replaced is None else replaced.skipped + 1)
             wrench = self._next(stream, known)
         self._give(wrench)
@@ -309,6 +323,16 @@ class PublishedWrenches:
             if not known.asked:
                 del self._streams[stream]
         self._give(wrench)
+
+    def recorded(self, stream: str, sample: zenoh.Sample, at: float, answer: Answer | None) -> None:
+        """Record a wrench of a stream that has arrived, with its answer if it has one."""
+        if self.record is None:
+            return
+        key, age = stream_key(self._robot, stream, ServiceName.SET_POINTS), time.perf_counter() - at
+        source = sample.source_info
+        client = "" if source is None else str(source.source_id.zid)
+        request, encoding = sample.payload.to_bytes(), str(sample.encoding)
+        self.record(Exchange(key, age, encoding, request, answer, client))
 
     def publish(self, stream: str, payload: bytes, encoding: str) -> None:
         """Publish an encoded `PublishedReply` of a stream."""

@@ -33,6 +33,7 @@ from .reply import (
     LastFailure as LastFailure,
     PlacedFrame as PlacedFrame,
     ProcessHealth as ProcessHealth,
+    RecordingHealth as RecordingHealth,
     Reply as Reply,
     RowReply as RowReply,
     SeatingReply as SeatingReply,

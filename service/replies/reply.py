@@ -24,6 +24,7 @@ __all__ = [
     "LastFailure",
     "PlacedFrame",
     "ProcessHealth",
+    "RecordingHealth",
     "Reply",
     "RowReply",
     "SeatingReply",
@@ -237,6 +238,23 @@ class LastFailure(Struct, kw_only=True):
     at: float
 
 
+class RecordingHealth(Struct, kw_only=True):
+    """State of the recording of a service.
+
+    - ``file``: file that is written; null while none can be.
+    - ``bytes``: size of the file [bytes].
+    - ``recorded``: number of questions and messages that have been recorded since the start.
+    - ``dropped``: number of those that have not, as the disk was full or too slow.
+    - ``problem``: why nothing is recorded now; null where all is well.
+    """
+
+    file: str | None
+    bytes: int
+    recorded: int
+    dropped: int
+    problem: str | None
+
+
 class HealthReply(Reply, kw_only=True):
     """Health of a service, for an operator.
 
@@ -247,6 +265,9 @@ class HealthReply(Reply, kw_only=True):
     - ``waiting``: number of questions that wait for a worker, by the kind of their queue.
     - ``processes``: state of every worker process.
     - ``last_failure``: most recent failure; null where there was none.
+    - ``clients``: number of sessions that are linked to the service, or have proven their names.
+    - ``streams``: number of streams that are kept.
+    - ``recording``: state of the recording; null without one.
     """
 
     robot: str
@@ -256,3 +277,6 @@ class HealthReply(Reply, kw_only=True):
     waiting: dict[str, int]
     processes: list[ProcessHealth]
     last_failure: LastFailure | None
+    clients: int = 0
+    streams: int = 0
+    recording: RecordingHealth | None = None

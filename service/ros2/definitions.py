@@ -173,6 +173,11 @@ class RosTypes:
         """Return the names of a type's fields, in order."""
         return [field for field, _ in self._store.fielddefs[name][1]]
 
+    def definition(self, name: str) -> str:
+        """Return the text of a message's type and of all types in it, as recordings have it."""
+        text, _ = self._store.generate_msgdef(name, ros_version=2)
+        return str(text)
+
     def make(self, name: str, /, **fields: Any) -> Any:
         """Return a message of a type from its fields, by name; those left out are zero or empty.
 

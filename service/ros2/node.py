@@ -15,7 +15,8 @@ import msgspec
 import zenoh
 import zenoh.ext
 
-from hand_models.base import CruxError
+from hand_models.base import CruxError, InvalidInputError
+from service.recording import RosSample
 from service.replies import BriefPlanReply, HealthReply, PlanReply, StreamReply
 from service.ros2.calls import RosCall, RosQuestion, ServiceCall
 from service.ros2.climb_action import ClimbAction, ClimbTopics, Play
@@ -28,11 +29,17 @@ from service.ros2.settings import ROS_SETTINGS
 from service.ros2.topics import RosStream
 from service.wire import Answer, ServiceName, service_key
 
-__all__ = ["RosNode"]
+__all__ = ["RosNode", "check_node"]
 
 log = logging.getLogger(__name__)
 
 Ask = Callable[[RosQuestion, str], None]
+
+
+def check_node(robot: str, domain: int) -> None:
+    """Check that there can be a node of a robot in a ROS domain; raise as `RosNode`."""
+    NodeNames(domain, "0", robot)
+    RosMessages()
 
 
 class RosNode:
@@ -98,7 +105,13 @@ class RosNode:
         self._closing = threading.Event()
         self._open = ExitStack()
 
-    def open(self, ask: Ask, health: Callable[[], Answer], play: Play) -> None:
+    def open(
+        self,
+        ask: Ask,
+        health: Callable[[], Answer],
+        play: Play,
+        record: Callable[[RosSample], None] | None = None,
+    ) -> None:
         """Declare services, topics and tokens; to be called when questions can be answered.
 
         Parameters
@@ -109,7 +122,12 @@ class RosNode:
             Returns the health of the service, an encoded `HealthReply`.
         play : Play
             Sends the set-points of a climb.
+        record : callable, optional
+            Takes each message of each topic, to be recorded.
         """
+        if record is not None:
+            for topic in self._topics.values():
+                self._until_the_end(self._recorded(topic, record))
         self._until_the_end(self._session.liveliness().declare_token(self._names.node_token()))
         publish = {
             name: self._publisher(self._topics[name])[0]
@@ -200,6 +218,17 @@ class RosNode:
 
     def _until_the_end(self, declared: Any) -> None:
         self._open.callback(declared.undeclare)
+
+    def _recorded(self, topic: Endpoint, record: Callable[[RosSample], None]) -> Any:
+        """Subscribe to a topic for a recording: what others publish there, only if it is taken."""
+        name, kind, definition = topic.name, topic.type, self._messages.types.definition(topic.type)
+
+        def take(sample: zenoh.Sample) -> None:
+            record(RosSample(name, kind, definition, sample.payload.to_bytes()))
+
+        taken = {self._topics[name].name for name in ("body_wrench", "rock", "slips")}
+        origin = zenoh.Locality.ANY if name in taken else zenoh.Locality.SESSION_LOCAL
+        return self._session.declare_subscriber(self._names.key(topic), take, allowed_origin=origin)
 
     def _announce(self, kind: EndpointKind, endpoint: Endpoint) -> str:
         """Declare the token of an endpoint, and return its key."""

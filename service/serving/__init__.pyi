@@ -11,5 +11,5 @@ from .config import (
 )
 from .monitor import JsonLines as JsonLines, LogThread as LogThread
 from .player import climb_set_points as climb_set_points, play as play
-from .server import PlanService as PlanService
+from .server import PlanService as PlanService, service_keys as service_keys
 from .settings import SERVING_SETTINGS as SERVING_SETTINGS

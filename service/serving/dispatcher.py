@@ -50,15 +50,13 @@ class Dispatcher:
     Parameters
     ----------
     pool : WorkerPool
-        Workers that answer. With 2 or more, questions that may take long leave one worker to other
-        questions.
+        Workers that answer; of 2 or more, one is left to questions that do not take long.
     seconds : float
         Deadline of a question that names none [s].
     robot : str
         Name of the robot, for the health reply.
     inquire : callable, optional
-        Called with a client's session identifier; asks that session for the digest of its secret,
-        which must then be passed to `proven`.
+        Called with a client's identifier; asks it for the digest of its secret, for `proven`.
 
     Attributes
     ----------
@@ -370,7 +368,9 @@ class Dispatcher:
     def _state(self) -> ServiceState:
         """Return what the service does, to whatever thread."""
         if threading.current_thread() is self._thread or not self._thread.is_alive():
-            return ServiceState(self._pool.states(), self._waiting.counts())
+            # besides the service's own session
+            clients, pool = max(len(self._names.connected()) - 1, 0), self._pool
+            return ServiceState(pool.states(), self._waiting.counts(), clients, pool.streams)
         found: SimpleQueue[ServiceState] = SimpleQueue()
         self._inbox.post(lambda: found.put(self._state()))
         try:

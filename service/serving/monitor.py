@@ -28,6 +28,7 @@ from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from hand_models.base import installed_version
+from service.recording import Recorder
 from service.replies import HealthReply, LastFailure, ProcessHealth
 from service.serving.question import PendingQuestion
 from service.wire import Answer, Format
@@ -46,10 +47,14 @@ class ServiceState(NamedTuple):
         One entry for each worker process.
     waiting : dict of str to int
         Number of waiting questions, by the kind of their queue.
+    clients, streams : int
+        Number of clients that are connected, and of streams that are kept.
     """
 
     processes: list[ProcessHealth]
     waiting: dict[str, int]
+    clients: int = 0
+    streams: int = 0
 
 
 class ServiceMonitor:
@@ -66,6 +71,8 @@ class ServiceMonitor:
     ----------
     registry : prometheus_client.CollectorRegistry
         All metrics of the service.
+    recorder : Recorder or None
+        Recorder of the service.
     """
 
     def __init__(self, robot: str, state: Callable[[], ServiceState]) -> None:
@@ -73,6 +80,7 @@ class ServiceMonitor:
         self._started = time.time()
         self._failure: LastFailure | None = None
         self._replied = 0
+        self.recorder: Recorder | None = None
         self.registry = kept = CollectorRegistry()
         # upper ends of the buckets in which times are counted [s]
         buckets = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -182,6 +190,9 @@ class ServiceMonitor:
             waiting=state.waiting,
             processes=state.processes,
             last_failure=self._failure,
+            clients=state.clients,
+            streams=state.streams,
+            recording=None if self.recorder is None else self.recorder.health(),
         )
         return Answer(Format.JSON.encode(reply), Format.JSON.label(reply))
 
@@ -209,6 +220,11 @@ class _Now(Collector):
         for kind, count in state.waiting.items():
             waiting.add_metric([kind], count)
         yield waiting
+        for name, words, count in (
+            ("clients", "Clients that are connected.", state.clients),
+            ("streams", "Streams that are kept.", state.streams),
+        ):
+            yield GaugeMetricFamily(f"crux_{name}", words, count)
         processes = GaugeMetricFamily(
             "crux_processes", "Processes by what they do.", labels=["purpose", "state"]
         )

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from enum import StrEnum
@@ -16,6 +17,8 @@ from functools import partial
 from queue import SimpleQueue
 
 from hand_models.base import CruxError
+from service.publishing import PublishedWrench
+from service.recording import Exchange
 from service.serving.monitor import ServiceMonitor
 from service.serving.question import AnyQuery, PendingQuestion
 from service.wire import Answer, BusyError, Format, encode_error
@@ -198,6 +201,7 @@ class Replies:
         """Send a part of an answer in the background; the question is still to be answered."""
         query, key = question.query, question.key
         send = partial(query.reply, key, answer.payload, encoding=answer.encoding)
+        self._record(question, answer, None)
         self._sender.send(self._queue_of(question), send)
 
     def reply(self, question: PendingQuestion, answer: Answer) -> None:
@@ -205,10 +209,21 @@ class Replies:
         if answer.seconds > 0.0:
             # a mean over about 20 questions
             self._mean += (answer.seconds - self._mean) / 20
+        self._record(question, answer, question.payload)
         question.replied, question.payload = True, b""
         self._monitor.count(question, answer.status, answer.seconds)
         send = partial(reply_to, question.query, question.key, lambda: answer)
         self._sender.send(self._queue_of(question), send)
+
+    def _record(self, question: PendingQuestion, answer: Answer, request: bytes | None) -> None:
+        """Record an answer, or a part of it, unless it is published: then it is recorded there."""
+        recorder = self._monitor.recorder
+        if recorder is None or isinstance(question.query, PublishedWrench):
+            return
+        now, key, encoding = time.perf_counter(), question.key, question.encoding
+        waited = (now if question.begun < 0.0 else question.begun) - question.arrived
+        age, client = now - question.arrived, question.client
+        recorder.add(Exchange(key, age, encoding, request, answer, client, waited))
 
     def _queue_of(self, question: PendingQuestion) -> str:
         """Return the queue of all replies to a question: its client's, or one of 8 shared ones."""

@@ -14,6 +14,7 @@ from functools import partial
 from socket import AF_INET, AF_INET6
 from typing import Any, Self
 
+import msgspec
 import zenoh
 from zenoh.handlers import Callback
 
@@ -23,6 +24,8 @@ from planner import Make, RobotFile, cores
 from service.answering import SERVICES_BY_NAME, robots_of
 from service.processes import Job, answering
 from service.publishing import PublishedWrenches
+from service.recording import Recorder
+from service.replies import HealthReply
 from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
 from service.ros2 import RosNode
 from service.servers import rivals_in_words
@@ -32,7 +35,12 @@ from service.serving.settings import SERVING_SETTINGS
 from service.serving.worker_pool import WorkerPool
 from service.wire import Answer, ServiceName, server_key, service_key
 
-__all__ = ["PlanService"]
+__all__ = ["PlanService", "service_keys"]
+
+
+def service_keys(robot: str) -> tuple[str, ...]:
+    """Return the zenoh keys of the questions that a service for a robot answers."""
+    return tuple(service_key(robot, name) for name in (*SERVICES_BY_NAME, ServiceName.CANCEL))
 
 
 class PlanService:
@@ -59,6 +67,9 @@ class PlanService:
     ros_domain : int, optional
         Number of the ROS domain in which the service is a node of ROS 2, too; by default it is
         none.
+    recorder : Recorder, optional
+        Records questions and answers, and what the node of ROS 2 takes and publishes; the caller
+        closes it.
     make : callable, optional
         Called once in each worker; returns the function that answers a `Job`. Pickled. By default
         the planner answers.
@@ -96,6 +107,7 @@ class PlanService:
         seconds: float = DEFAULT_DEADLINE,
         memory: int = 2 * 2**30,
         ros_domain: int | None = None,
+        recorder: Recorder | None = None,
         make: Make[Job, Answer] | None = None,
     ) -> None:
         # even on one core, what takes long leaves a process to others
@@ -108,8 +120,7 @@ class PlanService:
                 field="seconds",
             )
         (self.robot,) = robots_of(robot)
-        names = (*SERVICES_BY_NAME, ServiceName.CANCEL)
-        self.keys = tuple(service_key(self.robot, name) for name in names)
+        self.keys = service_keys(self.robot)
         self.operators = tuple(
             service_key(self.robot, name) for name in (ServiceName.HEALTH, ServiceName.METRICS)
         )
@@ -122,6 +133,8 @@ class PlanService:
         pool = WorkerPool(made, count, memory, self._wrenches.keep)
         self._dispatcher = Dispatcher(pool, seconds, self.robot, self._inquire)
         self._monitor = self._dispatcher.monitor
+        self._monitor.recorder = recorder
+        self._wrenches.record = None if recorder is None else recorder.add
         self._open = ExitStack()
 
     def rivals(self) -> str | None:
@@ -152,6 +165,11 @@ class PlanService:
                 field="--metrics-port",
             ) from None
 
+    def is_alive(self) -> bool:
+        """Return whether questions are taken in and given to workers; it may take up to 1 s."""
+        state = msgspec.json.decode(self._monitor.health().payload, type=HealthReply)
+        return any(each.purpose == "questions" for each in state.processes)
+
     def __enter__(self) -> Self:
         self._dispatcher.start()
         self._open.callback(self._dispatcher.close)
@@ -177,7 +195,9 @@ class PlanService:
         if self.ros is not None:
             self._open.callback(self.ros.close)
             player = partial(play, self._session, self.robot)
-            self.ros.open(self._dispatcher.ask, self._monitor.health, player)
+            recorder = self._monitor.recorder
+            record = None if recorder is None else recorder.add
+            self.ros.open(self._dispatcher.ask, self._monitor.health, player, record)
         self._open.callback(self._dispatcher.stop)
         for token in (self._alive, server_key(self.robot, self.server)):
             self._until_the_end(liveliness.declare_token(token))

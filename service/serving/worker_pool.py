@@ -51,6 +51,8 @@ class WorkerPool:
         Number of workers in a row that could not be started, or died before they were ready.
     start : float
         Time that the last worker took to become ready [s]; zero before there is any.
+    streams : int
+        Number of streams that are kept.
     """
 
     def __init__(
@@ -66,6 +68,7 @@ class WorkerPool:
         self.rests_until = 0.0
         self.failed_starts = 0
         self.start = 0.0
+        self.streams = 0
         self._purposes: dict[WorkerHandle[Job, Answer], Purpose] = {}
         self._starting: dict[WorkerHandle[Job, Answer], float] = {}
 
@@ -152,8 +155,12 @@ class WorkerPool:
         """
         done = lane.take()
         if done is not None and done.streams is not None:
-            self._keeps(done.streams)
+            self._keep(done.streams)
         return done
+
+    def _keep(self, streams: tuple[str, ...]) -> None:
+        self.streams = len(streams)
+        self._keeps(streams)
 
     def has_streams(self, lane: PriorityLane[Job, Answer]) -> bool:
         """Return whether a lane belongs to the worker that keeps the streams."""
@@ -237,7 +244,7 @@ class WorkerPool:
         """
         asked = [self.work.pop(lane, None) for lane in handle.lanes]
         if self._purposes[handle] == "streams":
-            self._keeps(())
+            self._keep(())
         self._starting.pop(handle, None)
         del self._purposes[handle]
         if handle.ready:

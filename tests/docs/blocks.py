@@ -115,7 +115,7 @@ class Reader:
     def _install(self) -> None:
         """Put commands beside the folder's files that are those of this checkout."""
         (self.folder / "bin").mkdir()
-        main = "from service.commands import main; main()"
+        main = "from service.__main__ import main; main()"
         for name, line in (
             ("crux", f'"{sys.executable}" -c "{main}" "$@"'),
             ("python3", f'"{sys.executable}" "$@"'),

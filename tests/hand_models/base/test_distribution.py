@@ -33,7 +33,7 @@ def test_the_name_is_that_of_the_project() -> None:
 
 
 def test_the_command_and_what_is_imported_keep_their_names() -> None:
-    assert PROJECT["scripts"] == {"crux": "service.commands:main"}
+    assert PROJECT["scripts"] == {"crux": "service.__main__:main"}
 
 
 @pytest.mark.parametrize("extra", sorted(EXTRAS))

@@ -184,7 +184,7 @@ def on_a_terminal(
     ours, theirs = pty.openpty()
     env = {name: value for name, value in os.environ.items() if name != "NO_COLOR"}
     process = subprocess.Popen(
-        [sys.executable, "-c", "from service.commands import main; main()", *arguments],
+        [sys.executable, "-c", "from service.__main__ import main; main()", *arguments],
         cwd=ROOT,
         env=env | {"TERM": "xterm", "COLUMNS": "80"} | more,
         **{"stdout": subprocess.DEVNULL, stream: theirs},
@@ -209,7 +209,7 @@ def test_colours_are_for_terminals_and_for_who_wants_them():
     assert f"{GREEN}OPTIMAL" in on_a_terminal(words)
     assert "\x1b[1;32m" not in on_a_terminal(words, NO_COLOR="1")
     piped = subprocess.run(
-        [sys.executable, "-c", "from service.commands import main; main()", *words],
+        [sys.executable, "-c", "from service.__main__ import main; main()", *words],
         cwd=ROOT,
         capture_output=True,
         text=True,

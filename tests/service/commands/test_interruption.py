@@ -217,7 +217,7 @@ def test_a_service_that_starts_ends_at_once_with_its_processes(number):
     [*(pytest.param(m, marks=pytest.mark.slow) for m in ("<&-", ">&-", "2>&-")), "<&- >&- 2>&-"],
 )
 def test_standard_streams_that_are_closed_cost_nothing_but_themselves(missing):
-    own = f"{shlex.quote(sys.executable)} -c 'from service.commands import main; main()'"
+    own = f"{shlex.quote(sys.executable)} -c 'from service.__main__ import main; main()'"
     done = subprocess.run(
         ["sh", "-c", f"{own} plan wall-300 --json {missing}"],
         capture_output=True,

@@ -21,7 +21,7 @@ watched = pytest.mark.skipif(not (PROC / "self/stat").exists(), reason="needs /p
 def begun(*arguments: str, before: str = "", **more: object) -> subprocess.Popen[bytes]:
     """A command that has just been started, in a process that runs some code before it."""
     return subprocess.Popen(
-        [sys.executable, "-c", f"{before}\nfrom service.commands import main; main()", *arguments],
+        [sys.executable, "-c", f"{before}\nfrom service.__main__ import main; main()", *arguments],
         cwd=ROOT,
         # a command whose files cannot grow would leave half of its modules' code
         env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "80", "PYTHONDONTWRITEBYTECODE": "1"},

@@ -17,7 +17,7 @@ def main() -> None:
     """Run the command line with this process's arguments, and exit with its status."""
     _open_what_is_closed()
     with interruptible():
-        from service.commands.cli import run_command_line
+        from service.commands import run_command_line
 
         sys.exit(run_command_line())
 

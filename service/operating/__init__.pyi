@@ -1,0 +1,10 @@
+from .checking import check_endpoints as check_endpoints, check_recording as check_recording
+from .moved import print_replay as print_replay, replay_json as replay_json
+from .options_file import read_options as read_options
+from .supervision import supervised as supervised
+from .top import (
+    Snapshot as Snapshot,
+    draw_top as draw_top,
+    read_snapshot as read_snapshot,
+    top_json as top_json,
+)

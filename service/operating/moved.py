@@ -1,0 +1,102 @@
+"""Say what a replay has found: how many answers are equal, and which fields have moved."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from hand_models.base import installed_version
+from service.recording import Moved, Replay
+from service.tables import counted, name, number, print_rows, text
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["print_replay", "replay_json"]
+
+
+def replay_json(replay: Replay) -> dict[str, Any]:
+    """Return the result of a replay as plain data."""
+    return {
+        "v": 1,
+        "recorded": replay.recording.about["version"],
+        "replayed": installed_version(),
+        "whole": replay.recording.whole,
+        "asked": replay.asked,
+        "equal": replay.equal,
+        "within_gap": replay.near,
+        "moved": replay.moved,
+        "left_out": replay.left_out,
+        "fields": [
+            {
+                "answer": each.kind,
+                "field": each.field,
+                "answers": each.answers,
+                "question": each.number,
+                "path": each.most.path,
+                "old": each.most.old,
+                "new": each.most.new,
+            }
+            for each in _ordered(replay)
+        ],
+    }
+
+
+def print_replay(replay: Replay, out: Console) -> None:
+    """Print the result of a replay: a sentence, and a table of the fields that have moved.
+
+    Parameters
+    ----------
+    replay : Replay
+    out : Console
+    """
+    about, here = replay.recording.about["version"] or "unknown", installed_version() or "unknown"
+    total = replay.equal + replay.near + replay.moved
+    kinds = ", ".join(f"{count:,} {kind}" for kind, count in sorted(replay.asked.items()))
+    out.print(
+        f"{counted(total, 'question')} of version {about} asked again of version {here}"
+        + (f": {kinds}" if kinds else ""),
+        markup=False,
+    )
+    lines = {
+        "equal to the digit": replay.equal,
+        "equal within their proven gaps: which plans a stream interpolates depends on time": (
+            replay.near
+        ),
+        "moved": replay.moved,
+        "not asked, as their answers depend on more than the question": replay.left_out,
+    }
+    for words, count in lines.items():
+        if count or words.startswith("equal to"):
+            out.print(f"{count:,} {words}", markup=False)
+    rows = _ordered(replay)
+    most = 20
+    more = [f"and {counted(len(rows) - most, 'more field')}: --json"] if len(rows) > most else []
+    if rows:
+        print_rows(rows[:most], MOVED_COLUMNS, out, "Fields that have moved most", legend=more)
+
+
+def _ordered(replay: Replay) -> list[Moved]:
+    """Return what has moved, in most answers first."""
+    return sorted(replay.fields.values(), key=lambda each: (-each.answers, each.kind, each.field))
+
+
+def _value(value: Any) -> str:
+    """Return a value as text, not too long; numbers with all digits."""
+    said, longest = value if isinstance(value, str) else repr(value), 40
+    return said if len(said) <= longest else f"{said[:longest]}…"
+
+
+def _size(moved: Moved) -> str | None:
+    return None if math.isinf(moved.most.size) else f"{moved.most.size:.1e}"
+
+
+MOVED_COLUMNS = (
+    name("answer", "kind"),
+    text("field", "field"),
+    number("in", "answers", ",d"),
+    number("by", _size),
+    text("old", lambda each: _value(each.most.old)),
+    text("new", lambda each: _value(each.most.new)),
+    number("question", "number", ",d"),
+)

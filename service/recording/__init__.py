@@ -1,0 +1,5 @@
+"""Recording of a service in an MCAP file, and replay of such a file."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
