@@ -15,7 +15,8 @@ tension, up to a maximum at which u is fixed.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +34,7 @@ from planner.programs import (
     Rows,
     StanceData,
     TensionTrade,
+    dual_active_set,
     is_least,
     optimum,
     parted,
@@ -165,8 +167,8 @@ def active_set_optimum(
         Factor on the weight of the program's second term, as in `programs.unique`.
     near : bool, optional
         True if the start is an exact optimum of another program, of the same hands at another body
-        wrench or with other tiles: its multipliers say more than its slacks, and few sets of active
-        rows are tried.
+        wrench or with other tiles: its multipliers say more than its slacks, and where other rows
+        are active, these are sought by the dual method (`programs.dual_active_set`).
 
     Returns
     -------
@@ -175,7 +177,10 @@ def active_set_optimum(
     """
     rows, weight = Rows.of(data), share * tie_weight(len(data.hands))
     Q = 2.0 * weight * data.rows.tie
-    found = _on_active_rows(rows, Q, _point(data, start), _rounds(len(Q)), near=near)
+    point = _point(data, start)
+    found = (
+        _near_optimum(rows, Q, point) if near else _on_active_rows(rows, Q, point, _rounds(len(Q)))
+    )
     if found is None:
         return None
     # with exact multipliers the bound of `unique_bound` is the optimum but for second terms
@@ -259,46 +264,39 @@ def _nearby(
 
 
 def _on_active_rows(
-    rows: Rows,
-    Q: Array,
-    start: Point,
-    rounds: int,
-    weight: float = 1.0,
-    *,
-    fixed: bool = False,
-    near: bool = False,
+    rows: Rows, Q: Array, start: Point, rounds: int, weight: float = 1.0, *, fixed: bool = False
 ) -> Optimum | None:
-    """Return the optimum from rows that may be active, as a solver's end has it, or one near it.
-
-    None if the optimum is too far; ``near`` is as of `active_set_optimum`.
-    """
-    if near:
-        rounds = min(rounds, 4)  # with more, it is sooner solved anew
-    for active in _guesses(rows, start, near=near):
-        try:
-            found = optimum(rows, Q, start, active, rounds, weight, fixed=fixed)
-        except ApartError:
-            continue
-        if found is not None or not near:
-            return found
+    """Return the optimum from rows that may be active where a solver ends; None if too far."""
+    # least ratio of multiplier to slack; more rows first
+    for ratio in (1e-6, 1.0):
+        guess = _guess(rows, start, ratio, -math.inf)
+        with suppress(ApartError):
+            return optimum(rows, Q, start, guess, rounds, weight, fixed=fixed)
     return None
 
 
-def _guesses(rows: Rows, start: Point, *, near: bool) -> Iterator[Mask]:
-    """Yield sets of rows that may be active at the optimum, the likeliest first."""
+def _near_optimum(rows: Rows, Q: Array, start: Point) -> Optimum | None:
+    """Return the optimum from that of another program, which is near; None if too far."""
+    # a row that does not count may be violated, and one that counts may have some slack
+    guess = _guess(rows, start, 1e-2, 1e-9)
+    with suppress(ApartError):
+        found = optimum(rows, Q, start, guess, 1)
+        if found is not None:
+            return found
+    active = dual_active_set(rows, Q, guess, start.multipliers)
+    if active is not None:
+        with suppress(ApartError):
+            # by rounding a row more or less
+            return optimum(rows, Q, start, active, 3)
+    return None
+
+
+def _guess(rows: Rows, start: Point, ratio: float, multiplier: float) -> Mask:
+    """Return rows with so large a multiplier, and at least so large a ratio of it to the slack."""
     room, multipliers = rows.room(start.z, start.u), start.multipliers
-    # least ratio of multiplier to slack, and least multiplier; more rows first
-    least = [(1e-6, -math.inf), (1.0, -math.inf)]
-    if near:
-        # a row that does not count may be violated, and one that counts may have some slack
-        least = [(1e-2, 1e-9), (0.0, 1e-9), (1.0, -math.inf)]
-    tried: list[Mask] = []
-    for ratio, multiplier in least:
-        active = (multipliers > ratio * room) & (multipliers > multiplier)
-        active[: rows.equations] = True
-        if not any(np.array_equal(active, other) for other in tried):
-            tried.append(active)
-            yield active
+    active = np.asarray((multipliers > ratio * room) & (multipliers > multiplier))
+    active[: rows.equations] = True
+    return active
 
 
 def _point(data: StanceData, outcome: Outcome) -> Point:

@@ -1,0 +1,52 @@
+"""The dual active-set method: from wrong guesses to the optimum that CVXPY has."""
+
+import numpy as np
+import pytest
+
+from planner.programs import Rows, dual_active_set, optimum, solvers, tie_weight
+from planner.programs.program import Best
+from planner.solving.unique_plan import active_set_optimum
+from tests.suite.helpers.stances import ask, on_wall, program_data
+
+
+@pytest.fixture(scope="module")
+def stance():
+    """Rows of a stance of four hands, the optimum that its solver leads to, and CVXPY's."""
+    data = program_data(ask(on_wall()))
+    exact = active_set_optimum(data, solvers.unique(data))
+    weights = tie_weight(len(data.hands)) * data.rows.tie
+    _, further = Best(data, weights=weights).by_definition()
+    return Rows.of(data), 2.0 * weights, exact.found, float(further[0])
+
+
+def test_a_guess_that_is_wrong_in_some_rows_leads_to_the_optimum(stance):
+    rows, Q, (point, face), least = stance
+    chance, others = np.random.default_rng(0), np.flatnonzero(~face.active)
+    own = np.flatnonzero(face.active)[rows.equations :]
+    found = 0
+    for wrong in (0, 1, 1, 2, 2, 3, 3, 4):
+        guess, multipliers = face.active.copy(), point.multipliers.copy()
+        guess[chance.choice(own, wrong, replace=False)] = False
+        guess[chance.choice(others, wrong, replace=False)] = True
+        multipliers[guess & ~face.active] = chance.uniform(0.0, 0.01, wrong)
+        active = dual_active_set(rows, Q, guess, multipliers)
+        if active is None:
+            continue
+        found += 1
+        again = optimum(rows, Q, point, active, 1)
+        assert again is not None
+        assert again.point.u == pytest.approx(point.u, abs=1e-9)
+        assert again.point.z == pytest.approx(point.z, abs=1e-7)
+        assert again.point.u == pytest.approx(least, abs=1e-5)
+    assert found >= 7
+
+
+def test_the_optimum_itself_needs_no_change(stance):
+    rows, Q, (point, face), *_ = stance
+    assert np.array_equal(dual_active_set(rows, Q, face.active, point.multipliers), face.active)
+
+
+def test_there_is_no_start_without_a_limit(stance):
+    rows, Q, (point, _), *_ = stance
+    equations = np.arange(len(rows.b)) < rows.equations
+    assert dual_active_set(rows, Q, equations, point.multipliers) is None
