@@ -15,16 +15,12 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hand_models.base import Array, BoundedStore, InvalidInputError, UnsupportedError
-from hand_models.fixed_wrist import slipped_hand, wrench_spaces
-from hand_models.hand import FINGERS, SettledHand
-from hand_models.wrench_spaces import WrenchSpace
+from hand_models.hand import FINGERS
 from planner.prepare import PreparedStance
-from planner.programs import HandData, ScaledRows, StanceData, blocks_of, hands_data
 from planner.question import LostTile
-from planner.recovery.joined_hands import JoinedHands
+from planner.recovery.hands_without import HandKey, HandsWithout
 from planner.recovery.spare_fingers import cannot_spare
 from planner.recovery.superposition import superposed
 from planner.result import Plan
@@ -84,19 +80,6 @@ class Recovered(NamedTuple):
         return self.found.plan()
 
 
-class _Hand(NamedTuple):
-    """A hand without tiles, its set, the scaled rows of the set, and its part of the programs."""
-
-    settled: SettledHand
-    space: WrenchSpace
-    scaled: ScaledRows
-    part: HandData
-
-
-_HandKey = tuple[int, tuple[int, ...], tuple[int, ...], bool]
-"""Index of a hand, its slipped tiles, its released fingers, and whether its palm holds."""
-
-
 class Recovery:
     """A prepared stance, for plans without tiles that have slipped. Safe to use from threads.
 
@@ -113,6 +96,9 @@ class Recovery:
     many : bool, optional
         True for very many losses of several tiles: hands without one tile are not worked out
         ahead, more hands are kept, and that there is no plan is not proven. Plans are the same.
+    like : Recovery, optional
+        Recovery of the same stance with palms of other strengths, for very many losses: its hands
+        without tiles, and its plans to start from, serve here, too.
 
     Raises
     ------
@@ -121,31 +107,28 @@ class Recovery:
         tensions of fingers that would have to be released.
     """
 
-    def __init__(self, prepared: PreparedStance, *, many: bool = False) -> None:
+    def __init__(
+        self, prepared: PreparedStance, *, many: bool = False, like: Recovery | None = None
+    ) -> None:
         _refuse(prepared)
         self.prepared = prepared
         self._many, self._checks = many, Checks.of(prepared)
-        data = prepared.hands.data
         self._places = {
             (limb, tile.finger, tile.phalanx): (h, t)
             for h, (limb, hand) in enumerate(zip(prepared.limbs, prepared.batch.hands, strict=True))
             for t, (tile, on_rock) in enumerate(zip(hand.tiles, hand.touching, strict=True))
             if on_rock
         }
-        self._pattern, self._blocks = _pattern(data), blocks_of(data.hands, len(data.wrench))
-        pairs = zip(prepared.batch.hands, prepared.hands.spaces, strict=True)
-        self._joined = [JoinedHands(*each) for each in pairs]
-        # each tile alone, two of a finger, and as many losses of several
-        most = 1024 if many else 4 * len(self._places) + 16
-        self._hands: BoundedStore[_HandKey, _Hand] = BoundedStore("hands without tiles", most)
-        self._stances: BoundedStore[tuple[_HandKey, ...], PreparedStance] = BoundedStore(
+        # each tile and each finger alone, two tiles of a finger, and as many losses of several
+        most = 1024 if many else 4 * len(self._places) + 32
+        self._hands = HandsWithout(prepared, most, None if like is None else like._hands)
+        self._stances: BoundedStore[tuple[HandKey, ...], PreparedStance] = BoundedStore(
             "stances without tiles", 4
         )
-        self._near: BoundedStore[tuple[_HandKey, ...], FixedSolution] = BoundedStore(
-            "plans without tiles", 256
-        )
+        near = BoundedStore[tuple[HandKey, ...], FixedSolution]("plans without tiles", 256)
+        self._near = near if like is None else like._near
         if not many:
-            self._hands_without((h, (t,), (), True) for h, t in self._places.values())
+            self._hands.find((h, (t,), (), True) for h, t in self._places.values())
 
     @property
     def tiles(self) -> tuple[LostTile, ...]:
@@ -201,13 +184,15 @@ class Recovery:
         return second if second.utilisation < first.utilisation else first
 
     def look_ahead(self) -> None:
-        """Work out the hands without two tiles of a finger, too, before such a loss is asked."""
+        """Work out the hands without a finger, or two of its tiles, and plan without a finger."""
         of_finger: dict[tuple[int, int], list[int]] = {}
         for h, t in self._places.values():
             finger = int(self.prepared.batch.hands[h].finger_of[t])
             of_finger.setdefault((h, finger), []).append(t)
         pairs = [(h, two) for (h, _), own in of_finger.items() for two in combinations(own, 2)]
-        self._hands_without((h, two, (), True) for h, two in pairs)
+        self._hands.find((h, two, (), True) for h, two in pairs)
+        for h, finger in of_finger:
+            self.plan((), released=[(self.prepared.limbs[h], FINGERS[finger])])
 
     def _by_hand(self, lost: Iterable[LostTile]) -> dict[int, list[int]]:
         """Return the tiles that have slipped, by the index of their hand."""
@@ -254,103 +239,65 @@ class Recovery:
         return Recovered(found, lost, tuple(open_fingers))
 
     def _stance_without(
-        self, keys: tuple[_HandKey, ...], body_wrench: Array | None
+        self, keys: tuple[HandKey, ...], body_wrench: Array | None
     ) -> PreparedStance:
         prepared = self._stances.get(keys, lambda: self._prepared(keys))
         return prepared if body_wrench is None else prepared.turned(body_wrench)
 
-    def _nearest(self, keys: tuple[_HandKey, ...]) -> FixedSolution | None:
-        """Return a solution to start from: of the same losses, or superposed from single ones."""
-        single = [((h, (t,), (), True),) for h, tiles, _, _ in keys for t in tiles]
+    def _nearest(self, keys: tuple[HandKey, ...]) -> FixedSolution | None:
+        """Return a solution to start from: of the same losses, superposed, or of one loss less."""
+        single = [
+            (each,)
+            for h, tiles, fingers, _ in keys
+            for each in (
+                *((h, (t,), (), True) for t in tiles),
+                *((h, (), (finger,), True) for finger in fingers),
+            )
+        ]
         same, whole, *others = self._near.find([keys, (), *single])
         starts = [each.start for each in others if each is not None and each.start is not None]
-        if same is not None or whole is None or whole.start is None or len(starts) < len(single):
+        if same is not None:
             return same
-        return replace(whole, start=superposed(whole.start, starts))
+        if whole is not None and whole.start is not None and len(starts) == len(single):
+            return replace(whole, start=superposed(whole.start, starts))
+        # mostly one tile slips after the other
+        return next((each for each in self._near.find(_one_less(keys)) if each), whole)
 
     def _keys(
         self,
         by_hand: Mapping[int, Sequence[int]],
         released: Collection[tuple[str, str]],
         off: Collection[str],
-    ) -> tuple[_HandKey, ...]:
-        """Return what is gone of each hand that is not whole."""
+    ) -> tuple[HandKey, ...]:
+        """Return what is gone of each hand that is not whole: fingers, and tiles of others."""
         keys = []
         for h, limb in enumerate(self.prepared.limbs):
             fingers = sorted(FINGERS.index(finger) for at, finger in released if at == limb)
-            tiles = sorted(by_hand.get(h, ()))
+            finger_of = self.prepared.batch.hands[h].finger_of
+            tiles = sorted(t for t in by_hand.get(h, ()) if finger_of[t] not in fingers)
             if tiles or fingers or limb in off:
                 keys.append((h, tuple(tiles), tuple(fingers), limb not in off))
         return tuple(keys)
 
-    def _hands_without(self, keys: Iterable[_HandKey]) -> dict[_HandKey, _Hand]:
-        """Return hands without tiles; those that are new are worked out in one call."""
-        asked = list(dict.fromkeys(keys))
-        known = zip(asked, self._hands.find(asked), strict=True)
-        found = {key: hand for key, hand in known if hand is not None}
-        new = [key for key in asked if key not in found]
-        if not new:
-            return found
-        parts = {key: self._by_finger(key) for key in new}
-        of_parts = self._hands_without(part for own in parts.values() for part in own.values())
-        made = dict(self._slipped([key for key in new if not parts[key]]))
-        for key, own in parts.items():
-            if own:
-                of_fingers = {finger: of_parts[part] for finger, part in own.items()}
-                made[key] = self._joined[key[0]].join(
-                    {finger: (hand.settled, hand.space) for finger, hand in of_fingers.items()}
-                )
-        sets, at = self.prepared.hands, [h for h, *_ in made]
-        scaled = [ScaledRows.of(space) for _, space in made.values()]
-        rows = hands_data(scaled, sets.transports[at], [sets.held[h] for h in at])
-        for h, part in zip(at, rows, strict=True):
-            limits, hard, loads = self._blocks[h]
-            self._pattern[limits, loads] |= part.L != 0.0
-            self._pattern[hard, loads] |= part.H != 0.0
-        hands = {
-            key: _Hand(*hand, own, part)
-            for (key, hand), own, part in zip(made.items(), scaled, rows, strict=True)
-        }
-        self._hands.keep(hands.items())
-        return found | hands
-
-    def _by_finger(self, key: _HandKey) -> dict[int, _HandKey]:
-        """Return the hands that have lost only one finger's tiles, by finger; none of one finger.
-
-        None either of a hand that is off the rock.
-        """
-        h, tiles, released, palm = key
-        finger_of = self.prepared.batch.hands[h].finger_of.tolist()
-        fingers = {finger_of[t] for t in tiles} | {*released}
-        if not palm or len(fingers) < 2:
-            return {}
-        return {
-            finger: (h, (), (finger,), True)
-            if finger in released
-            else (h, tuple([t for t in tiles if finger_of[t] == finger]), (), True)
-            for finger in sorted(fingers)
-        }
-
-    def _slipped(
-        self, keys: Sequence[_HandKey]
-    ) -> Iterator[tuple[_HandKey, tuple[SettledHand, WrenchSpace]]]:
-        """Yield hands after slips, and their sets with the rows that the stance adds."""
-        sets, whole = self.prepared.hands, self.prepared.batch.hands
-        hands = [
-            slipped_hand(whole[h], tiles, fingers, palm=palm) for h, tiles, fingers, palm in keys
-        ]
-        plain = wrench_spaces(hands, self.prepared.question.limits.tendon_tension)
-        for key, hand, space in zip(keys, hands, plain, strict=True):
-            yield key, (hand, sets.added[key[0]].on(space))
-
-    def _prepared(self, keys: Sequence[_HandKey]) -> PreparedStance:
+    def _prepared(self, keys: Sequence[HandKey]) -> PreparedStance:
         """Return the stance with hands that are not whole, prepared for the solver."""
         prepared, hands, others = self.prepared, list(self.prepared.batch.hands), {}
-        for (h, *_), found in self._hands_without(keys).items():
+        for (h, *_), found in self._hands.find(keys).items():
             hands[h], others[h] = found.settled, (found.space, found.scaled, found.part)
         # the rows as the solver takes them are in the pattern that it has already
-        sets = prepared.hands.with_hands(others, self._pattern)
+        sets = prepared.hands.with_hands(others, self._hands.pattern)
         return replace(prepared, batch=prepared.batch.after_slips(hands), hands=sets)
+
+
+def _one_less(keys: tuple[HandKey, ...]) -> list[tuple[HandKey, ...]]:
+    """Return the same losses without one of the tiles each."""
+    found = []
+    for i, (h, tiles, fingers, palm) in enumerate(keys):
+        for t in tiles:
+            others = tuple([each for each in tiles if each != t])
+            own = ((h, others, fingers, palm),) if others or fingers or not palm else ()
+            found.append((*keys[:i], *own, *keys[i + 1 :]))
+    return found
 
 
 def _released(prepared: PreparedStance, h: int) -> Iterator[str]:
@@ -359,19 +306,6 @@ def _released(prepared: PreparedStance, h: int) -> Iterator[str]:
     bearing = {tile.finger for tile in hand.tiles if tile.contact != "none"}
     before = {tile.finger for tile in hand.as_closed.tiles if tile.contact != "none"}
     yield from (finger for finger in FINGERS if finger in before - bearing)
-
-
-def _pattern(data: StanceData) -> NDArray[np.bool_]:
-    """Return where rows may have entries that are not zero, whichever tiles slip.
-
-    The balance, and rows that couple more than two loads of a hand, may have all.
-    """
-    places, balance = np.asarray(data.rows.whole != 0.0), len(data.wrench)
-    places[:balance] = True
-    for _, _, loads in blocks_of(data.hands, balance):
-        own = places[:, loads]
-        own[own.sum(axis=1) > 2] = True
-    return places
 
 
 def _refuse(prepared: PreparedStance) -> None:

@@ -13,7 +13,6 @@ import numpy as np
 from msgspec import structs
 
 from hand_models.base import Array, Indices
-from hand_models.hand import SettledHand
 from hand_models.parameters import bundled_table
 from planner import deadline
 from planner.prepare import PreparedStance, prepare_stance
@@ -294,6 +293,7 @@ class _Replanned:
         self._prepared, self._late, self._whole = prepared, late_slips, cascade
         self._tiles = len(prepared.batch.engagement)
         self._recoveries: dict[bytes, Recovery] = {}
+        """By the palms that have slipped; all share hands and starts with that of none."""
         names = unit_names(prepared)[: self._tiles]
         self._names = [LostTile(limb, finger or "", phalanx) for limb, finger, phalanx in names]
         nothing = np.zeros(cascade.units, dtype=bool)
@@ -337,10 +337,8 @@ class _Replanned:
 
     def _planned(self, gone: Flags) -> Cascade | None:
         tiles, palms = gone[: self._tiles], gone[self._tiles :]
-        if palms.tobytes() not in self._recoveries:
-            self._recoveries[palms.tobytes()] = Recovery(self._without_palms(palms), many=True)
         lost = [self._names[t] for t in np.flatnonzero(tiles)]
-        found = self._recoveries[palms.tobytes()].plan(lost)
+        found = self._without_palms(palms).plan(lost)
         if found.verified is None:
             return None
         arrays, batch = found.verified.arrays, self._prepared.batch
@@ -355,14 +353,17 @@ class _Replanned:
             return None
         return self._whole.replanned(loads, np.concatenate([off, palms]))
 
-    def _without_palms(self, palms: Flags) -> PreparedStance:
-        """Return the stance with palms that have slipped in shear."""
-        if not palms.any():
-            return self._prepared
-        hands: list[SettledHand] = []
-        for hand, slipped in zip(self._prepared.batch.hands, palms.tolist(), strict=True):
-            weak = hand.palm._replace(
-                shear_limit=DRAW_SETTINGS.slipped_palm * hand.palm.shear_limit
-            )
-            hands.append(replace(hand, palm=weak) if slipped else hand)
-        return self._prepared.with_hands(hands)
+    def _without_palms(self, palms: Flags) -> Recovery:
+        """Return the recovery of the stance with palms that have slipped in shear."""
+        key, nothing = palms.tobytes(), np.zeros_like(palms)
+        if key not in self._recoveries:
+            prepared, like = self._prepared, None
+            if palms.any():
+                like, hands = self._without_palms(nothing), list(prepared.batch.hands)
+                for h in np.flatnonzero(palms).tolist():
+                    most = DRAW_SETTINGS.slipped_palm * hands[h].palm.shear_limit
+                    weak = hands[h].palm._replace(shear_limit=most)
+                    hands[h] = replace(hands[h], palm=weak)
+                prepared = prepared.with_hands(hands)
+            self._recoveries[key] = Recovery(prepared, many=True, like=like)
+        return self._recoveries[key]

@@ -103,8 +103,12 @@ def least_utilisation(
         program is solved again.
     """
     if near is not None:
-        exact = active_set_optimum(data, near.outcome, near=True)
-        if exact is not None and not _far_beyond(exact.outcome):
+        share = near.outcome.value**-2 if _far_beyond(near.outcome) else 1.0
+        exact = active_set_optimum(data, near.outcome, share, near=True)
+        if exact is not None and (share < 1.0 or _far_beyond(exact.outcome)):
+            share = min(exact.outcome.value**-2, 1.0)
+            exact = active_set_optimum(data, exact.outcome, share, near=True)
+        if exact is not None:
             return _meant(data, exact, cap, closing, near.meant)
     outcome, share = programs.unique(data), 1.0
     if outcome.solved and _far_beyond(outcome):

@@ -290,7 +290,9 @@ def test_what_cannot_slip_is_refused_by_name(recoveries):
 def test_a_tile_lost_twice_counts_once(recoveries):
     recovery = recoveries["wall-300"]
     tile = recovery.tiles[5]
-    assert recovery.plan([tile, tile]).utilisation == recovery.plan([tile]).utilisation
+    twice, once = recovery.plan([tile, tile]), recovery.plan([tile])
+    assert twice.lost == once.lost
+    assert twice.utilisation == pytest.approx(once.utilisation, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", ["wall-300", "boulders"])
@@ -308,6 +310,39 @@ def test_a_plan_does_not_depend_on_where_its_search_starts(recoveries, name):
         assert tensions[0] == pytest.approx(tensions[1], abs=0.05)
 
 
+def test_hands_and_starts_of_other_palms_change_no_plan(recoveries):
+    """A palm that has slipped, as in a simulation, with and without the whole stance's recovery."""
+    whole = recoveries["wall-300"].prepared
+    hands = list(whole.batch.hands)
+    hands[1] = replace(hands[1], palm=hands[1].palm._replace(shear_limit=1.0))
+    weak = whole.with_hands(hands)
+    first = Recovery(whole, many=True)
+    both = Recovery(weak, many=True, like=first), Recovery(weak)
+    for lost in some(first, 9, 5):
+        first.plan(lost)
+        one, two = (recovery.plan(lost) for recovery in both)
+        assert one.verified is not None
+        assert one.utilisation == pytest.approx(two.utilisation, abs=1e-6)
+        tensions = [each.verified.arrays.tensions for each in (one, two)]
+        assert tensions[0] == pytest.approx(tensions[1], abs=0.05)
+
+
+def test_plans_without_a_finger_are_starts_for_those_without_it_and_more(recoveries):
+    recovery = Recovery(recoveries["wall-300"].prepared)
+    recovery.plan(())
+    recovery.look_ahead()
+    tile = LostTile("rear_left", "inner_left", "distal")
+    gone = [("front_left", "outer_left")]
+    for lost in ([tile], [tile, LostTile("front_left", "outer_left", "middle")]):
+        recovery.plan([tile])
+        before = WAITING_SOLVERS.info()
+        found = recovery.plan(lost, released=gone)
+        assert WAITING_SOLVERS.info() == before
+        cold = Recovery(recovery.prepared).plan(lost, released=gone)
+        assert found.utilisation == pytest.approx(cold.utilisation, abs=1e-5)
+        assert found.released == cold.released == tuple(gone)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_hand_joined_from_fingers_is_that_worked_out_as_one(recoveries, name):
     """With each tile of a finger, two of it, or the whole finger gone, beside another's."""
@@ -318,11 +353,13 @@ def test_a_hand_joined_from_fingers_is_that_worked_out_as_one(recoveries, name):
         for count in (2, 3, 5):
             tiles = tuple(sorted(rng.choice(on, count, replace=False).tolist()))
             released = (int(rng.integers(len(FINGERS))),)
-            ((key, found),) = recovery._hands_without([(h, tiles, released, True)]).items()
+            ((key, found),) = recovery._hands.find([(h, tiles, released, True)]).items()
             settled = slipped_hand(hand, tiles, released)
             (space,) = wrench_spaces([settled], prepared.question.limits.tendon_tension)
             space = prepared.hands.added[h].on(space)
-            assert len({*hand.finger_of[list(tiles)], *released}) == 1 or recovery._by_finger(key)
+            assert len(
+                {*hand.finger_of[list(tiles)], *released}
+            ) == 1 or recovery._hands._by_finger(key)
             for field in ("origin", "generators", "L", "l0", "s", "H", "h"):
                 mine, own = getattr(found.space, field), getattr(space, field)
                 assert mine == pytest.approx(own, rel=1e-12, abs=1e-12), (h, tiles, released, field)
