@@ -260,7 +260,7 @@ class SettledHand:
         """True for tiles that are on rock (contact ``face`` or ``edge``), shape (n,)."""
         return np.array([tile.contact in ("face", "edge") for tile in self.tiles])
 
-    @property
+    @cached_property
     def lateral_shares(self) -> Array:
         """Share of its finger's lateral reaction that each tile carries, shape (n,).
 

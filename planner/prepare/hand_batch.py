@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
@@ -272,23 +272,23 @@ class HandBatch:
             _palm_limits(hands),
         )
 
-    @property
+    @cached_property
     def closing_tensions(self) -> tuple[float, ...]:
         """Closing tension of each hand [N]."""
         return tuple([hand.closing_tension for hand in self.hands])
 
-    @property
+    @cached_property
     def friction(self) -> Array:
         """Friction coefficient of each tile's surface, shape (T,)."""
         each = np.array([hand.surface.friction for hand in self.hands])
         return each[self.places.hand]
 
-    @property
+    @cached_property
     def stops(self) -> NDArray[np.int8]:
         """Mechanical stop that each finger joint is at, as codes of `JOINT_STOPS`, shape (F, 3)."""
         return concatenated([hand.postures.stops for hand in self.hands])
 
-    @property
+    @cached_property
     def bearing_shares(self) -> Array:
         """Share of what balances its joint that each contact bears, shape (F, 3)."""
         return concatenated([hand.postures.bearing_shares for hand in self.hands])

@@ -34,6 +34,7 @@ from planner.programs import (
     Outcome,
     ScaledRows,
     StanceData,
+    blocks_of,
     hands_data,
 )
 from planner.question import Stance
@@ -213,8 +214,9 @@ class HandSets:
         spaces, scaled, parts = list(self.spaces), list(self.scaled), list(self.data.hands)
         for h, each in found.items():
             spaces[h], scaled[h], parts[h] = each
-        data = StanceData.of(tuple(parts), self.wrench)
-        data = replace(data, rows=replace(data.rows, kept=kept))
+        blocks = blocks_of(parts, len(self.wrench))
+        rows = self.data.rows.with_hands({h: parts[h] for h in found}, blocks)
+        data = StanceData(tuple(parts), self.wrench, replace(rows, kept=kept))
         return replace(self, spaces=tuple(spaces), scaled=tuple(scaled), data=data)
 
     def turned(self, wrench: Array) -> HandSets:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate, pairwise
@@ -158,6 +158,27 @@ class HandRows:
             whole[hard, loads] = hand.H
         tie = np.concatenate([hand.tie for hand in hands])
         return cls(whole, rest, sum(len(hand.l0) for hand in hands), unit, tie)
+
+    def with_hands(
+        self, hands: Mapping[int, HandData], blocks: Sequence[tuple[slice, slice, slice]]
+    ) -> HandRows:
+        """Return the rows with those of some hands replaced, by their index.
+
+        ``blocks`` are those of `blocks_of`; the balance, limits and hard rows stay as many.
+        """
+        whole, rest, tie = self.whole.copy(), self.rest.copy(), self.tie.copy()
+        balance = len(whole) - len(rest)
+        for h, hand in hands.items():
+            limits, hard, loads = blocks[h]
+            whole[:balance, loads], whole[limits, loads], whole[hard, loads] = (
+                hand.G,
+                hand.L,
+                hand.H,
+            )
+            rest[limits.start - balance : limits.stop - balance] = -hand.l0
+            rest[hard.start - balance : hard.stop - balance] = hand.h
+            tie[loads] = hand.tie
+        return HandRows(whole, rest, self.limits, self.unit, tie, self.kept)
 
     @cached_property
     def columns(self) -> Columns:

@@ -167,6 +167,8 @@ class LoadRecovery:
         Wrench space of each hand.
     scaled : sequence of ScaledRows, optional
         Scaled rows of the wrench spaces, if already computed.
+    before : LoadRecovery, optional
+        That of the same hands before tiles slipped, from which all that stays is taken over.
 
     Attributes
     ----------
@@ -182,15 +184,31 @@ class LoadRecovery:
         known: HandBatch,
         spaces: Sequence[WrenchSpace],
         scaled: Sequence[ScaledRows] | None = None,
+        before: LoadRecovery | None = None,
     ) -> None:
         self._known, settled = known, known.hands
-        pieces = tuple([inner_half_planes(hand.surface) for hand in settled])
-        signs = [2 if hand.grasp.lateral else 1 for hand in settled]
-        limits = [len(own) * sign for own, sign in zip(pieces, signs, strict=True)]
-        tiles = tuple([hand.tiles for hand in settled])
-        columns, rows = zip(*((space.columns, space.rows) for space in spaces), strict=True)
-        closed = tuple([hand.as_closed.tiles for hand in settled])
-        self._layout = layout = _layout_of(closed, columns, rows, tuple(limits))
+        self._scaled = tuple(map(ScaledRows.of, spaces) if scaled is None else scaled)
+        if before is None:
+            pieces = tuple([inner_half_planes(hand.surface) for hand in settled])
+            signs = [2 if hand.grasp.lateral else 1 for hand in settled]
+            limits = [len(own) * sign for own, sign in zip(pieces, signs, strict=True)]
+            columns, rows = zip(*((space.columns, space.rows) for space in spaces), strict=True)
+            closed = tuple([hand.as_closed.tiles for hand in settled])
+            layout = _layout_of(closed, columns, rows, tuple(limits))
+            self.least = layout.least.take(layout.columns)
+            self.rows = np.zeros((*layout.shape, layout.columns.shape[1]))
+            self.at_rest = np.zeros(layout.shape)
+            self._drawn = _drawn_tendons(known)
+        else:
+            layout, pieces = before._layout, before._fixed[1]
+            self.least, self._drawn = before.least, before._drawn
+            self.rows, self.at_rest = before.rows.copy(), before.at_rest.copy()
+        self._layout = layout
+        for h, own in enumerate(self._scaled):
+            if before is None or own is not before._scaled[h]:
+                end, count = 6 + len(own.L), own.L.shape[1]
+                self.rows[h, :6, :count], self.rows[h, 6:end, :count] = own.generators, own.L
+                self.at_rest[h, :6], self.at_rest[h, 6:end] = own.origin, own.l0
 
         laws = concatenated([hand.loads for hand in settled])
         self._at_zero, self._slope = np.zeros((len(laws), 3)), np.empty((len(laws), 3))
@@ -198,19 +216,10 @@ class LoadRecovery:
         self._slope[:, 2] = known.lateral_shares
         if len(layout.hooked):
             self._slope[layout.hooked, 0] = 1.0
-        self.least = layout.least.take(layout.columns)
-        self.rows = np.zeros((*layout.shape, layout.columns.shape[1]))
-        self.at_rest = np.zeros(layout.shape)
-        of_sets = [ScaledRows.of(space) for space in spaces] if scaled is None else scaled
-        for mine, rest, own in zip(self.rows, self.at_rest, of_sets, strict=True):
-            end, columns = 6 + len(own.L), own.L.shape[1]
-            mine[:6, :columns], mine[6:end, :columns] = own.generators, own.L
-            rest[:6], rest[6:end] = own.origin, own.l0
         slipped = np.array([[hand.closed is not None] for hand in settled])
         self._released = layout.columns[slipped & ~self.rows[:, :6].any(axis=1)]
-        self._drawn = _drawn_tendons(known)
         self._fixed = (
-            tiles,
+            tuple([hand.tiles for hand in settled]),
             pieces,
             tuple([hand.palm.engaged for hand in settled]),
             (None,) * len(settled),

@@ -103,7 +103,8 @@ class Checks(NamedTuple):
         """
         question, batch, hands = prepared.question, prepared.batch, prepared.hands
         check = Check(question, batch, prepared.where, lost, self.check)
-        return Checks(check, LoadRecovery(batch, hands.spaces, hands.scaled), self.idle)
+        reader = LoadRecovery(batch, hands.spaces, hands.scaled, self.recovery)
+        return Checks(check, reader, self.idle)
 
 
 def prepare_checks(prepared: PreparedStance) -> Checks:

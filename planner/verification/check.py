@@ -96,7 +96,11 @@ class SettledLimits:
         whole = None if before is None else before._balance
         self._balance = balance = JointBalance(names, giving, whole)
         self.nails = nails = NailLimits(names)
-        drives = DriveLimits(names, balance.left, strength, nails.fingers)
+        if before is None:
+            drives = DriveLimits(names, balance.left, strength, nails.fingers)
+        else:
+            drives = before._drives.after_slips(names)
+        self._drives: DriveLimits = drives
         self.tiles = tiles = TileLimits(names, nails.tiles)
         self._twists = TwistLimits(known) if before is None else before._twists
         self.limits = (balance, tiles, drives, self._twists, HandLimits(names))

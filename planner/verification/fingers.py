@@ -6,6 +6,7 @@ the program.
 
 from __future__ import annotations
 
+from copy import copy
 from enum import IntEnum
 
 import numpy as np
@@ -61,12 +62,8 @@ class DriveLimits(ResidualLimits):
         known = names.known
         hands, index, body = known.hands, known.places, known.hands[0].hand
         self._names, self._places, self._body, self._hooked = names, index, body, hooked
-        lateral = np.array([hand.surface.lateral_limit for hand in hands])[index.hand]
-        aside = lateral * known.engagement * known.touch.touches
-        aside = np.add.reduceat(aside, index.first_of_finger)
-        # fingers without rock have no reaction
-        # signs of a lateral reaction to either side
-        self._aside = np.array([[1.0], [-1.0]]) / np.where(aside > 0.0, aside, np.inf)
+        self._lateral = np.array([hand.surface.lateral_limit for hand in hands])[index.hand]
+        self._aside = self._per_reaction(known)
         drive, nail = body.drive, body.nail
         self._winch = drive.winch_radius
         # Eq. 5: a tile's spring and the rock's shear balance the tendon's two strands
@@ -89,6 +86,19 @@ class DriveLimits(ResidualLimits):
         self._per_shear[_Row.SHEAR] = 1.0 / body.structure.finger_shear
         self._hand = np.arange(len(hands)).repeat(FINGER_COUNT)
         self._hand_of_drive = np.tile(self._hand, _Row.TENDON)
+
+    def _per_reaction(self, known: HandBatch) -> Array:
+        """Return what a lateral reaction to either side uses per newton, shape (2, F) [1/N]."""
+        aside = self._lateral * known.engagement * known.touch.touches
+        aside = np.add.reduceat(aside, self._places.first_of_finger)
+        # fingers without rock have no reaction
+        return np.array([[1.0], [-1.0]]) / np.where(aside > 0.0, aside, np.inf)
+
+    def after_slips(self, names: PartNames) -> DriveLimits:
+        """Return the limits of the same hands after tiles have slipped, by the names of these."""
+        other = copy(self)
+        other._names, other._aside = names, other._per_reaction(names.known)
+        return other
 
     def recompute(self, again: Recomputed) -> list[Residual]:
         """Return the utilisations of tendons, motors and fingers, and errors of reported drives.

@@ -21,7 +21,7 @@ the share w of what balances its joint, and the joint, which is taken as locked,
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,12 @@ from planner.verification.residuals import (
 )
 
 __all__ = ["Fingers", "JointBalance"]
+
+
+STOP_SIGNS: Final = np.array(
+    [{"upper": 1.0, "lower": -1.0}.get(str(stop), 0.0) for stop in JOINT_STOPS]
+)
+"""Signs of a joint's torque on the limit at which it stands."""
 
 
 class Fingers(NamedTuple):
@@ -124,9 +130,7 @@ class JointBalance(ResidualLimits):
             self._bears = touch.contacts[places.phalanges] != CONTACT_CODES["none"]
             alone = ~self._bears.any(axis=1, keepdims=True)
             self.held = (known.stops > 0) | alone
-            # signs of a joint's torque on the limit at which it stands
-            signs = [{"upper": 1.0, "lower": -1.0}.get(str(stop), 0.0) for stop in JOINT_STOPS]
-            sides = np.array(signs)[known.stops] * ~alone
+            sides = STOP_SIGNS[known.stops] * ~alone
             self.stop_fingers, self.stop_joints = sides.nonzero()
             self._sides = sides[self.stop_fingers, self.stop_joints]
 
