@@ -34,7 +34,6 @@ from planner.programs import (
     Outcome,
     ScaledRows,
     StanceData,
-    blocks_of,
     hands_data,
 )
 from planner.question import Stance
@@ -214,8 +213,7 @@ class HandSets:
         spaces, scaled, parts = list(self.spaces), list(self.scaled), list(self.data.hands)
         for h, each in found.items():
             spaces[h], scaled[h], parts[h] = each
-        blocks = blocks_of(parts, len(self.wrench))
-        rows = self.data.rows.with_hands({h: parts[h] for h in found}, blocks)
+        rows = self.data.rows.with_hands(parts, found)
         data = StanceData(tuple(parts), self.wrench, replace(rows, kept=kept))
         return replace(self, spaces=tuple(spaces), scaled=tuple(scaled), data=data)
 

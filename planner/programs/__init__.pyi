@@ -14,7 +14,7 @@ from .conic import (
     Outcome as Outcome,
     Reached as Reached,
 )
-from .dual_active_set import dual_active_set as dual_active_set
+from .dual_active_set import active_rows_near as active_rows_near
 from .dual_bounds import (
     convex_bound as convex_bound,
     hazard_bound as hazard_bound,

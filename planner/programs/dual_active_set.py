@@ -26,7 +26,7 @@ import numpy as np
 from hand_models.base import Array, Indices
 from planner.programs.active_set import TOLERANCES, Mask, Rows
 
-__all__ = ["dual_active_set"]
+__all__ = ["active_rows_near"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class DualSettings:
 DUAL_SETTINGS: Final = DualSettings()
 
 
-def dual_active_set(rows: Rows, Q: Array, guess: Mask, multipliers: Array) -> Mask | None:
+def active_rows_near(rows: Rows, Q: Array, guess: Mask, multipliers: Array) -> Mask | None:
     """Return the active rows of a quadratic program, sought from a guess.
 
     Parameters
@@ -68,6 +68,8 @@ def dual_active_set(rows: Rows, Q: Array, guess: Mask, multipliers: Array) -> Ma
     size = np.sqrt(np.einsum("ij,ij->i", F, F))
     # rows of nothing bind nothing
     counts = size > 0.0
+    if not (counts[: rows.equations].all() and rows.d.any()):
+        return None
     size[~counts] = 1.0
     F /= size[:, None]
     d, b = rows.d / size, rows.b / size
@@ -126,7 +128,7 @@ def _first(
 
     The equations come first.
     """
-    at = np.flatnonzero(guess)
+    at: Indices = np.flatnonzero(guess)
     weight = -multipliers[at]
     weight[:equations] = -math.inf
     at = at[weight.argsort(kind="stable")]
@@ -146,7 +148,7 @@ def _first(
         signed = (inverse @ np.concatenate(([whole], -b[at])))[1 + equations :]
         pulls = signed < -DUAL_SETTINGS.multiplier * whole
         if not pulls.any():
-            return at, inverse
+            return at, np.asarray(inverse)
         if taken >= DUAL_SETTINGS.starts:
             pulls = np.arange(len(signed)) == signed.argmin()
         kept = np.concatenate((np.ones(equations, dtype=bool), ~pulls))
@@ -169,4 +171,4 @@ def _without_row(inverse: Array, gone: int) -> Array:
     column = inverse[kept, gone]
     smaller = inverse[kept][:, kept]
     smaller -= column[:, None] * (column / inverse[gone, gone])
-    return smaller
+    return np.asarray(smaller)

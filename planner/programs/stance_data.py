@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate, pairwise
@@ -159,17 +159,13 @@ class HandRows:
         tie = np.concatenate([hand.tie for hand in hands])
         return cls(whole, rest, sum(len(hand.l0) for hand in hands), unit, tie)
 
-    def with_hands(
-        self, hands: Mapping[int, HandData], blocks: Sequence[tuple[slice, slice, slice]]
-    ) -> HandRows:
-        """Return the rows with those of some hands replaced, by their index.
-
-        ``blocks`` are those of `blocks_of`; the balance, limits and hard rows stay as many.
-        """
+    def with_hands(self, hands: Sequence[HandData], others: Iterable[int]) -> HandRows:
+        """Return the rows of as many hands of as many rows, of which some are others."""
         whole, rest, tie = self.whole.copy(), self.rest.copy(), self.tie.copy()
         balance = len(whole) - len(rest)
-        for h, hand in hands.items():
-            limits, hard, loads = blocks[h]
+        blocks = blocks_of(hands, balance)
+        for h in others:
+            hand, (limits, hard, loads) = hands[h], blocks[h]
             whole[:balance, loads], whole[limits, loads], whole[hard, loads] = (
                 hand.G,
                 hand.L,

@@ -60,6 +60,7 @@ class HandsWithout:
     ) -> None:
         data = prepared.hands.data
         self._prepared, self._like = prepared, like
+        self.pattern: NDArray[np.bool_]
         self.pattern = _pattern(data) if like is None else like.pattern
         self._blocks = blocks_of(data.hands, len(data.wrench))
         pairs = zip(prepared.batch.hands, prepared.hands.spaces, strict=True)

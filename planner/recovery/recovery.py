@@ -121,12 +121,13 @@ class Recovery:
         }
         # each tile and each finger alone, two tiles of a finger, and as many losses of several
         most = 1024 if many else 4 * len(self._places) + 32
+        self._hands: HandsWithout
         self._hands = HandsWithout(prepared, most, None if like is None else like._hands)
         self._stances: BoundedStore[tuple[HandKey, ...], PreparedStance] = BoundedStore(
             "stances without tiles", 4
         )
-        near = BoundedStore[tuple[HandKey, ...], FixedSolution]("plans without tiles", 256)
-        self._near = near if like is None else like._near
+        self._near: BoundedStore[tuple[HandKey, ...], FixedSolution]
+        self._near = BoundedStore("plans without tiles", 256) if like is None else like._near
         if not many:
             self._hands.find((h, (t,), (), True) for h, t in self._places.values())
 

@@ -50,19 +50,26 @@ def cannot_spare(
         sets = [each.hands.spaces[h] for each in (whole, prepared)]
         rows = [each.hands.data.hands[h] for each in (whole, prepared)]
         multipliers = np.concatenate([limits, least.hard_duals[h]])
-        theirs = np.array([row.finger in names for row in sets[0].rows])
-        of_hand = multipliers * [row.finger is None for row in sets[0].rows]
+        owners = [row.finger for row in sets[0].rows]
+        theirs = np.array([owner in names for owner in owners])
+        of_hand, nobody = multipliers * [owner is None for owner in owners], len(limits)
         columns = np.array(["/" in name for name in sets[0].columns])
-        V = np.hstack([each.generators[:, columns] for each in sets])
+        V = np.concatenate([each.generators[:, columns] for each in sets], axis=1)
         slopes = np.concatenate(
             [
-                (of_hand @ np.concatenate([each.L, each.H]) + least.balance_dual @ each.G)[columns]
+                (
+                    of_hand[:nobody] @ each.L
+                    + of_hand[nobody:] @ each.H
+                    + least.balance_dual @ each.G
+                )[columns]
                 for each in rows
             ]
         )
-        tiles = np.isin(hand.finger_of, [FINGERS.index(name) for name in names])
+        tiles = np.logical_or.reduce([hand.finger_of == FINGERS.index(name) for name in names])
         forces = (hand.loads[tiles, None, :, 0] @ hand.axes[tiles, :2])[:, 0]
-        moments = np.cross(hand.positions[tiles], forces)
+        x, y, z = hand.positions[tiles].T
+        along, across, up = forces.T
+        moments = np.array([y * up - z * across, z * along - x * up, x * across - y * along]).T
         wrench = np.concatenate([forces.sum(axis=0), moments.sum(axis=0)])
         loads = np.linalg.lstsq(V, wrench, rcond=1e-9)[0]
         if not np.abs(V @ loads - wrench).max() <= 1e-9 * max(1.0, np.abs(wrench).max()):

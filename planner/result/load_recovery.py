@@ -18,7 +18,7 @@ from hand_models.compliance import FloatingWrist
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR, layout_of
 from hand_models.hand import FINGERS, NAIL, SettledHand, SettledTile
-from hand_models.tile import inner_half_planes
+from hand_models.tile import HalfPlane, inner_half_planes
 from hand_models.wrench_spaces import WRENCH_SCALE, Row, WrenchSpace
 from planner.prepare import (
     CONTACT_CODES,
@@ -186,10 +186,12 @@ class LoadRecovery:
         scaled: Sequence[ScaledRows] | None = None,
         before: LoadRecovery | None = None,
     ) -> None:
+        self._layout: _LoadLayout
+        self._pieces: tuple[tuple[HalfPlane, ...], ...]
         self._known, settled = known, known.hands
         self._scaled = tuple(map(ScaledRows.of, spaces) if scaled is None else scaled)
         if before is None:
-            pieces = tuple([inner_half_planes(hand.surface) for hand in settled])
+            self._pieces = pieces = tuple([inner_half_planes(hand.surface) for hand in settled])
             signs = [2 if hand.grasp.lateral else 1 for hand in settled]
             limits = [len(own) * sign for own, sign in zip(pieces, signs, strict=True)]
             columns, rows = zip(*((space.columns, space.rows) for space in spaces), strict=True)
@@ -200,7 +202,7 @@ class LoadRecovery:
             self.at_rest = np.zeros(layout.shape)
             self._drawn = _drawn_tendons(known)
         else:
-            layout, pieces = before._layout, before._fixed[1]
+            layout, self._pieces = before._layout, before._pieces
             self.least, self._drawn = before.least, before._drawn
             self.rows, self.at_rest = before.rows.copy(), before.at_rest.copy()
         self._layout = layout
@@ -209,21 +211,16 @@ class LoadRecovery:
                 end, count = 6 + len(own.L), own.L.shape[1]
                 self.rows[h, :6, :count], self.rows[h, 6:end, :count] = own.generators, own.L
                 self.at_rest[h, :6], self.at_rest[h, 6:end] = own.origin, own.l0
-
         laws = concatenated([hand.loads for hand in settled])
         self._at_zero, self._slope = np.zeros((len(laws), 3)), np.empty((len(laws), 3))
         self._at_zero[:, :2], self._slope[:, :2] = laws[..., 0], laws[..., 1]
         self._slope[:, 2] = known.lateral_shares
-        if len(layout.hooked):
-            self._slope[layout.hooked, 0] = 1.0
+        self._slope[layout.hooked, 0] = 1.0
         slipped = np.array([[hand.closed is not None] for hand in settled])
         self._released = layout.columns[slipped & ~self.rows[:, :6].any(axis=1)]
-        self._fixed = (
-            tuple([hand.tiles for hand in settled]),
-            pieces,
-            tuple([hand.palm.engaged for hand in settled]),
-            (None,) * len(settled),
-        )
+        engaged = tuple([hand.palm.engaged for hand in settled])
+        tiles, wrists = tuple([hand.tiles for hand in settled]), (None,) * len(settled)
+        self._fixed = tiles, self._pieces, engaged, wrists
 
     def read(self, loads: Sequence[Array]) -> tuple[PlanArrays, Array, float]:
         """Convert loads y of all hands into loads of tiles, tendons, motors and palms.

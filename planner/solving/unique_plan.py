@@ -34,7 +34,7 @@ from planner.programs import (
     Rows,
     StanceData,
     TensionTrade,
-    dual_active_set,
+    active_rows_near,
     is_least,
     optimum,
     parted,
@@ -172,7 +172,7 @@ def active_set_optimum(
     near : bool, optional
         True if the start is an exact optimum of another program, of the same hands at another body
         wrench or with other tiles: its multipliers say more than its slacks, and where other rows
-        are active, these are sought by the dual method (`programs.dual_active_set`).
+        are active, these are sought by the dual method (`programs.active_rows_near`).
 
     Returns
     -------
@@ -287,7 +287,7 @@ def _near_optimum(rows: Rows, Q: Array, start: Point) -> Optimum | None:
         found = optimum(rows, Q, start, guess, 1)
         if found is not None:
             return found
-    active = dual_active_set(rows, Q, guess, start.multipliers)
+    active = active_rows_near(rows, Q, guess, start.multipliers)
     if active is not None:
         with suppress(ApartError):
             # by rounding a row more or less

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planner.programs import Rows, dual_active_set, optimum, solvers, tie_weight
+from planner.programs import Rows, active_rows_near, optimum, solvers, tie_weight
 from planner.programs.program import Best
 from planner.solving.unique_plan import active_set_optimum
 from tests.suite.helpers.stances import ask, on_wall, program_data
@@ -29,7 +29,7 @@ def test_a_guess_that_is_wrong_in_some_rows_leads_to_the_optimum(stance):
         guess[chance.choice(own, wrong, replace=False)] = False
         guess[chance.choice(others, wrong, replace=False)] = True
         multipliers[guess & ~face.active] = chance.uniform(0.0, 0.01, wrong)
-        active = dual_active_set(rows, Q, guess, multipliers)
+        active = active_rows_near(rows, Q, guess, multipliers)
         if active is None:
             continue
         found += 1
@@ -43,10 +43,10 @@ def test_a_guess_that_is_wrong_in_some_rows_leads_to_the_optimum(stance):
 
 def test_the_optimum_itself_needs_no_change(stance):
     rows, Q, (point, face), *_ = stance
-    assert np.array_equal(dual_active_set(rows, Q, face.active, point.multipliers), face.active)
+    assert np.array_equal(active_rows_near(rows, Q, face.active, point.multipliers), face.active)
 
 
 def test_there_is_no_start_without_a_limit(stance):
     rows, Q, (point, _), *_ = stance
     equations = np.arange(len(rows.b)) < rows.equations
-    assert dual_active_set(rows, Q, equations, point.multipliers) is None
+    assert active_rows_near(rows, Q, equations, point.multipliers) is None
