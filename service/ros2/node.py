@@ -15,7 +15,7 @@ import msgspec
 import zenoh
 import zenoh.ext
 
-from hand_models.base import CruxError, InvalidInputError
+from hand_models.base import CruxError
 from service.recording import RosSample
 from service.replies import BriefPlanReply, HealthReply, PlanReply, StreamReply
 from service.ros2.calls import RosCall, RosQuestion, ServiceCall
