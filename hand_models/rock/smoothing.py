@@ -157,13 +157,11 @@ def smooth(points: Array, scale: Scale) -> Array | None:
 @lru_cache(maxsize=64)
 def _weights(part: int) -> Array:
     """Return the weights of 2 part + 1 points with which a parabola is fitted at each of them."""
-    length = 2 * part + 1
-    return np.array(
-        [
-            scipy.signal.savgol_coeffs(length, min(2, 2 * part), pos=i, use="dot")
-            for i in range(length)
-        ]
-    )
+    # as `scipy.signal.savgol_coeffs` has them, whose room takes longer to load than all rock
+    places = np.arange(2 * part + 1.0)
+    powers = np.arange(min(2, 2 * part) + 1.0)[:, None]
+    first = (powers[:, 0] == 0.0).astype(float)
+    return np.array([scipy.linalg.lstsq((places - i) ** powers, first)[0] for i in places])
 
 
 def _reached(pieces: Sequence[Array], scale: Scale) -> list[Array]:
