@@ -78,6 +78,7 @@ from .processes import (
     PriorityLane as PriorityLane,
     WorkerHandle as WorkerHandle,
     Workers as Workers,
+    begin_fork_server as begin_fork_server,
     cores as cores,
     resident as resident,
     send_part as send_part,

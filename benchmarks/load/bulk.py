@@ -78,7 +78,10 @@ def workers(pid: int) -> list[int]:
             words = Path(f"/proc/{each}/cmdline").read_bytes()
         except OSError:
             continue
-        if b"spawn_main" in words:
+        if b"forkserver import main" in words:
+            # those that are forked have its words, and start nothing themselves
+            found += children(each)
+        elif b"spawn_main" in words:
             found.append(each)
     return found
 

@@ -1,10 +1,13 @@
+from .starting import (
+    begin_fork_server as begin_fork_server,
+    starting_children as starting_children,
+)
 from .worker_handles import (
     Make as Make,
     PriorityLane as PriorityLane,
     WorkerHandle as WorkerHandle,
     resident as resident,
     send_part as send_part,
-    starting_children as starting_children,
 )
 from .workers import (
     Lost as Lost,

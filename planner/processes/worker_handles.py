@@ -15,26 +15,21 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from contextvars import ContextVar
-from dataclasses import dataclass
 from functools import partial
-from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
-from types import FrameType
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
-__all__ = [
-    "SETTINGS",
-    "Make",
-    "PriorityLane",
-    "ProcessSettings",
-    "WorkerHandle",
-    "resident",
-    "send_part",
-    "starting_children",
-]
+from planner.processes.starting import (
+    SETTINGS,
+    fork_server_died,
+    start_method,
+    starting_children,
+)
+
+__all__ = ["Make", "PriorityLane", "WorkerHandle", "resident", "send_part"]
 
 Input = TypeVar("Input")
 Output = TypeVar("Output")
@@ -43,25 +38,6 @@ Make = Callable[[], Callable[[Input], Output]]
 """Factory that is called once in a worker and returns the function that answers questions."""
 
 _sender: ContextVar[Callable[[object], None] | None] = ContextVar("_sender", default=None)
-
-
-@dataclass(frozen=True, slots=True)
-class ProcessSettings:
-    """Constants of worker processes and of the process that starts them."""
-
-    signals: tuple[signal.Signals, ...] = (signal.SIGINT, signal.SIGTERM)
-    thread_variables: tuple[str, ...] = (
-        "OPENBLAS_NUM_THREADS",
-        "OMP_NUM_THREADS",
-        "MKL_NUM_THREADS",
-    )
-    """Environment variables that limit a linear-algebra library to one thread, when it loads."""
-    part_bytes: int = 2**13  # of an answer, sent at once: no process can be stopped within them
-    out_of_memory: int = 77  # exit status of one that may not have the memory it needs
-    starts: int = 2  # in a row that may fail, or die before they are ready; then no more are tried
-
-
-SETTINGS: Final = ProcessSettings()
 
 
 class PriorityLane(Generic[Input, Output]):
@@ -176,14 +152,17 @@ class WorkerHandle(Generic[Input, Output]):
         *,
         stays: bool = False,
     ) -> None:
-        context = multiprocessing.get_context("spawn")
+        context = start_method()
         ends = [context.Pipe() for _ in range(lanes)]
         others = [other for _, other in ends]
-        self.process = context.Process(
-            target=_answer_each, args=(others, memory, stays), daemon=True
-        )
         with starting_children():
-            self.process.start()
+            run = partial(_answer_each, others, memory, stays, dict(os.environ))
+            self.process = context.Process(target=run, daemon=True)
+            try:
+                self.process.start()
+            except EOFError:
+                fork_server_died()
+                raise ChildProcessError("the process that workers are forked from died") from None
         for other in others:
             # the process has the other ends alone, so that its death ends the pipes
             other.close()
@@ -213,6 +192,12 @@ class WorkerHandle(Generic[Input, Output]):
         self.process.join(1.0 if dead else 0.0)  # [s] its pipes end a moment earlier
         status = self.process.exitcode
         self.process.kill()
+        if status == SETTINGS.unknown:
+            fork_server_died()
+            if not dead and self.process.pid is not None:
+                status = None
+                with suppress(ProcessLookupError):
+                    os.kill(self.process.pid, signal.SIGKILL)
         self.process.join()
         for lane in self.lanes:
             lane.close()
@@ -220,6 +205,8 @@ class WorkerHandle(Generic[Input, Output]):
             return "was stopped"
         if status == SETTINGS.out_of_memory:
             return "had not enough memory"
+        if status == SETTINGS.unknown:
+            return "ended, and so did the process that would know how"
         return f"was killed by signal {-status}" if status < 0 else f"ended with status {status}"
 
 
@@ -242,9 +229,14 @@ def send_part(part: object) -> None:
         send(part)
 
 
-def _answer_each(pipes: list[Connection], memory: int | None, stays: bool) -> None:
+def _answer_each(
+    pipes: list[Connection], memory: int | None, stays: bool, variables: dict[str, str]
+) -> None:
     """Answer what comes through pipes until their other ends are gone: a process's whole run."""
     _begin_child(stays=stays)
+    # a fork server has those with which it was started
+    os.environ.clear()
+    os.environ.update(variables)
     # [s], a tenth of Python's own: a short question would wait that long for a long one at
     # each of its steps
     sys.setswitchinterval(5e-4)
@@ -319,57 +311,3 @@ def _end_with_parent() -> None:
         wait([parent.sentinel])
         time.sleep(1.0)  # [s] for what it is about to end by itself
         os._exit(1)
-
-
-@contextmanager
-def starting_children(*signals: signal.Signals) -> Iterator[None]:
-    """Context manager in which worker processes are started: no signal interrupts a start.
-
-    Signals that arrive are handled in this process when the block ends. A child receives them only
-    once it calls `_begin_child`, never if it does not. Children run their linear algebra on one
-    thread.
-
-    Parameters
-    ----------
-    *signals : Signals
-        Signals to hold back; SIGINT and SIGTERM by default.
-    """
-    signals = signals or SETTINGS.signals
-    # or else it is started with the first process, and lets signals in again
-    resource_tracker.ensure_running()
-    arrived: list[int] = []
-
-    def later(number: int, _: FrameType | None) -> None:
-        arrived.append(number)
-
-    handlers: dict[int, Any] = {}
-    if threading.current_thread() is threading.main_thread():
-        for each in signals:
-            if signal.getsignal(each) not in (None, signal.SIG_IGN):
-                handlers[each] = signal.signal(each, later)
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
-    try:
-        with _one_thread():
-            yield
-    finally:
-        # what has waited here arrives now
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
-        for number in arrived:
-            signal.raise_signal(number)
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Let processes that are started here do their linear algebra on one thread."""
-    before = {name: os.environ.get(name) for name in SETTINGS.thread_variables}
-    os.environ.update(dict.fromkeys(SETTINGS.thread_variables, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value

@@ -18,7 +18,8 @@ from typing import Generic, NamedTuple, Self, TypeVar, cast
 from cachetools import LRUCache
 
 from hand_models.base import CruxError
-from planner.processes.worker_handles import SETTINGS, Make, PriorityLane, WorkerHandle
+from planner.processes.starting import SETTINGS
+from planner.processes.worker_handles import Make, PriorityLane, WorkerHandle
 
 __all__ = ["Lost", "Workers", "by_index", "cores"]
 

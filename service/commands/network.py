@@ -185,6 +185,7 @@ def serve_command(
         )
         return
     stop = _StopSignal()
+    planner.begin_fork_server()  # it loads what workers need, while this process loads zenoh
     # a client that does not read blocks one of these threads while zenoh waits for it
     threads = "(rx: (worker_threads: 4), net: (worker_threads: 4), tx: (worker_threads: 4))"
     os.environ.setdefault("ZENOH_RUNTIME", threads)

@@ -8,6 +8,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from shutil import rmtree
 from types import FrameType
 from typing import Final
 
@@ -88,6 +89,11 @@ def kill_children() -> None:
     children = getattr(sys.modules.get("multiprocessing"), "active_children", None)
     for process in children() if children is not None else ():
         process.kill()
+    if "multiprocessing.forkserver" in sys.modules:
+        from multiprocessing.util import get_temp_dir
+
+        # with the socket of the process that they are forked from, which then ends
+        rmtree(get_temp_dir(), ignore_errors=True)
 
 
 _reported: list[str] = []

@@ -57,7 +57,7 @@ class Job(NamedTuple):
 def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[[Job], Answer]:
     """Return the function with which a worker process answers jobs.
 
-    The planner and its libraries are imported by this call, so that no question waits for them.
+    What most questions need is imported by this call, so that they do not wait for it.
 
     Parameters
     ----------
@@ -71,15 +71,11 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
     callable
         Takes a `Job` and returns its `Answer`; keeps declared streams from call to call.
     """
-    from hand_models.hand import load_closing
+    # a single plan loads these only when it needs them
+    import_module("service.processes.loaded")
     from planner import deadline, send_part
     from service.answering import Streams, handle, robots_of
 
-    # a single plan loads these only when it needs them
-    scipy = ("linalg", "optimize", "signal", "spatial", "stats")
-    for name in ("cvxpy", *(f"scipy.{part}" for part in scipy), "trimesh"):
-        import_module(name)
-    load_closing()
     robots = robots_of(robot)
     streams = Streams()
 

@@ -46,7 +46,7 @@ def service_keys(robot: str) -> tuple[str, ...]:
 class PlanService:
     """Plan service of one robot on a zenoh session; it answers inside its ``with`` block.
 
-    Questions are answered in worker processes, which are spawned: a program that serves needs its
+    Questions are answered in worker processes, which import the program: one that serves needs its
     ``if __name__ == "__main__":``.
 
     Parameters

@@ -185,7 +185,7 @@ class WorkerPool:
             lane
             for lane, asked in self.work.items()
             # a process that has just died is reported by its pipe next
-            if asked is None and lane.ready and lane.handle.process.is_alive()
+            if asked is None and lane.ready and not lane.pipe.poll()
         ]
 
     def takes_dear(self) -> bool:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import multiprocessing
 import os
+import sys
+import threading
 from collections import Counter
 from collections.abc import Iterator
 from functools import partial
@@ -13,10 +15,13 @@ from pathlib import Path
 import pytest
 
 from hand_models.base import CruxError
-from planner.processes.worker_handles import SETTINGS
+from planner.processes import starting
+from planner.processes.starting import SETTINGS
 from planner.processes.workers import Lost, Workers
 from tests.suite.helpers import workshop
-from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.patience import PATIENCE, soon
+
+forked = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux alone")
 
 KILLED = "processes do not start: a worker was killed by signal 9"
 
@@ -142,14 +147,14 @@ def test_what_the_system_does_not_start_is_told_in_a_line(monkeypatch, caplog):
 
 
 def test_processes_that_die_before_they_have_read_what_is_large_do_not_hang(monkeypatch):
-    start = multiprocessing.context.SpawnProcess.start
+    start = multiprocessing.process.BaseProcess.start
 
     def killed(process):
         start(process)
         process.kill()
         process.join(PATIENCE)
 
-    monkeypatch.setattr(multiprocessing.context.SpawnProcess, "start", killed)
+    monkeypatch.setattr(multiprocessing.process.BaseProcess, "start", killed)
     with Workers(partial(workshop.squares, "x" * 5_000_000), 2) as workers:
         assert not_started(workers) == KILLED
 
@@ -162,6 +167,74 @@ def test_each_process_does_its_linear_algebra_on_one_thread(monkeypatch):
         assert set(done(workers, list(variables)).values()) == {"1"}
     assert os.environ[variables[0]] == "7"
     assert variables[1] not in os.environ
+
+
+def test_a_process_has_the_variables_of_the_time_at_which_it_starts(monkeypatch, nappers):
+    """Not those of the first that was started, from whose server it is forked."""
+    nappers.wait()
+    monkeypatch.setenv("CRUX_TEST", "now")
+    with Workers(workshop.threads, 1) as workers:
+        assert done(workers, ["CRUX_TEST"]) == {0: "now"}
+
+
+def orphaned(pid: int, parent: int) -> bool:
+    """Whether a process has another parent now, or has ended."""
+    try:
+        state, above = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[:2]
+    except OSError:
+        return True
+    return state == "Z" or int(above) != parent
+
+
+@forked
+def test_processes_are_forked_from_one_without_threads_that_has_loaded_the_planner():
+    with Workers(workshop.forked_from, 2) as workers:
+        found = done(workers, [None] * 8)
+    servers = {server for _, server, _ in found.values()}
+    assert all(loaded for *_, loaded in found.values())
+    (server,) = servers - {os.getpid()}
+    assert len(list(Path(f"/proc/{server}/task").iterdir())) == 1
+    maps = Path(f"/proc/{server}/maps").read_text()
+    assert "numba" in maps
+    assert "zenoh" not in maps
+
+
+@forked
+def test_where_what_they_are_forked_from_is_killed_nothing_is_lost(monkeypatch):
+    monkeypatch.setattr(starting, "_fork_server_died", threading.Event())
+    with Workers(workshop.forked_from, 2) as workers:
+        workers.wait()
+        server = done(workers, [None])[0][1]
+        os.kill(server, 9)
+        first = [process.pid for process in processes(workers)]
+        assert soon(lambda: all(orphaned(pid, server) for pid in first))
+        # those that there are work on
+        assert {pid for pid, *_ in done(workers, [None] * 8).values()} <= set(first)
+        os.kill(first[0], 9)
+        # and what dies now is replaced without it
+        assert soon(lambda: first[0] not in {pid for pid, *_ in done(workers, [None] * 8).values()})
+        assert not any(isinstance(each, Lost) for each in done(workers, [None] * 8).values())
+        last = [process.pid for process in processes(workers)]
+        assert (len(last), first[1] in last, first[0] in last) == (2, True, False)
+        words = Path(f"/proc/{(set(last) - {first[1]}).pop()}/cmdline").read_bytes()
+        assert b"spawn_main" in words
+    # the end of the pool ends them all
+    assert soon(lambda: not any(Path(f"/proc/{pid}").exists() for pid in {*first, *last}))
+
+
+@pytest.mark.parametrize("error", [OSError("no address"), EOFError])
+def test_where_none_can_be_forked_they_are_spawned(monkeypatch, error):
+    def refused(*_):
+        raise error
+
+    monkeypatch.setattr(multiprocessing.context.ForkServerProcess, "_Popen", refused)
+    starting._fork_server_works.cache_clear()
+    try:
+        with Workers(workshop.naps, 1) as workers:
+            assert done(workers, [0.0])
+            assert [type(process).__name__ for process in processes(workers)] == ["SpawnProcess"]
+    finally:
+        starting._fork_server_works.cache_clear()
 
 
 def test_what_a_process_has_loaded_is_not_looked_through_for_garbage():

@@ -9,6 +9,7 @@ import queue
 import signal
 import subprocess
 import sys
+import threading
 import urllib.request
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -21,6 +22,7 @@ import pytest
 import zenoh
 
 from hand_models.base import InvalidInputError
+from planner.processes import starting
 from service.serving import PlanService, dispatcher, open_session, zenoh_config
 from service.serving.settings import SERVING_SETTINGS
 from service.wire import LostError, service_key
@@ -255,6 +257,26 @@ def test_processes_that_are_killed_are_replaced_whatever_they_do(
         site.wait_until(client, gone)
         assert "pid" in client.ask({"echo": 1})
         assert "pid" in client.ask({"stream": "1"}, SET_POINTS)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux alone")
+def test_nobody_notices_the_death_of_what_processes_are_forked_from(
+    site: Site, client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(starting, "_fork_server_died", threading.Event())
+    (first, *others) = [p["pid"] for p in site.wait_until(client, all_up)["processes"]]
+    words = Path(f"/proc/{first}/stat").read_text().rpartition(")")[2].split()
+    os.kill(int(words[1]), signal.SIGKILL)
+    for _ in range(4):
+        assert client.ask({"echo": 1})["pid"] in (first, *others)
+    assert client.ask({"stream": "1"}, SET_POINTS)["pid"] in (first, *others)
+    # one that hangs is ended all the same, and one that dies is replaced
+    answer = client.ask({"sleep": LONG, "deadline": 0.5})
+    assert kind(answer) == "deadline"
+    assert kind(client.ask({"signal": int(signal.SIGKILL)})) == "lost"
+    health = site.wait_until(client, all_up)
+    assert len({first, *others} - {p["pid"] for p in health["processes"]}) == 2
+    assert "pid" in client.ask({"echo": 1})
 
 
 @pytest.mark.parametrize("purpose", ["questions", "streams", "spare"])

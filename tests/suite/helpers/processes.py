@@ -42,22 +42,30 @@ def until(true: Callable[[], object], process: subprocess.Popen[bytes]) -> None:
     assert soon(came)
 
 
-def alive(session: int) -> list[str]:
-    """Command lines of the processes of a session that have not ended."""
-    found = []
+def alive(session: int) -> dict[int, tuple[int, str]]:
+    """Parent and command line of the processes of a session that have not ended."""
+    found = {}
     for entry in PROC.glob("[0-9]*"):
         try:
-            state, _, _, own = (entry / "stat").read_text().rpartition(")")[2].split()[:4]
+            state, parent, _, own = (entry / "stat").read_text().rpartition(")")[2].split()[:4]
             if int(own) == session and state != "Z":
-                found.append((entry / "cmdline").read_bytes().replace(b"\0", b" ").decode())
+                words = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode()
+                found[int(entry.name)] = int(parent), words
         except (OSError, ValueError):
             continue
     return found
 
 
-def workers(process: subprocess.Popen[bytes]) -> list[str]:
+def workers(process: subprocess.Popen[bytes]) -> list[int]:
     """Processes that work for a command."""
-    return [words for words in alive(process.pid) if "spawn_main" in words]
+    own = alive(process.pid)
+    # those that are forked keep the words of the one that they are forked from
+    forked = {pid for pid, (_, words) in own.items() if "forkserver import main" in words}
+    return [
+        pid
+        for pid, (parent, words) in own.items()
+        if "spawn_main" in words or (pid in forked and parent in forked)
+    ]
 
 
 def loaded(process: subprocess.Popen[bytes], library: str) -> bool:

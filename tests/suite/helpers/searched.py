@@ -10,7 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import planner
-from hand_models import hand
 from service.answering import climbs
 from service.answering.own_models import Robots
 from service.processes import Job, answering, questions
@@ -29,7 +28,7 @@ def asked(**does: object) -> ClimbRequest:
 def searching() -> Callable[[Job], Answer]:
     """Called in each process: all but the search is the service's own; libraries load late."""
     climbs.answer_climb = _answer
-    questions.import_module = hand.load_closing = lambda *_: None
+    questions.import_module = lambda *_: None
     return answering(None, None)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import signal
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -54,6 +55,11 @@ def naps() -> Callable[[float], int]:
 def threads() -> Callable[[str], str | None]:
     """Looks up what its environment says."""
     return os.environ.get
+
+
+def forked_from() -> Callable[[object], tuple[int, int, bool]]:
+    """Tells its own process and the one that it is from, and whether what plans need is loaded."""
+    return lambda _: (os.getpid(), os.getppid(), "service.processes.loaded" in sys.modules)
 
 
 def looked_through() -> Callable[[object], bool]:
