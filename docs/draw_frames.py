@@ -10,17 +10,17 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hand_models import Cylinder, Grasp, SpinyHand, Surface
-from hand_models.base import Array
+from hand_models.base import COLOUR_OF, Array, write_picture
 from hand_models.hand import SettledHand
 
 PICTURE = Path(__file__).parent / "frames.png"
 DIAMETER = 0.3
-COLOURS = ("tab:red", "tab:green", "tab:blue")
+AXIS_COLOURS = (COLOUR_OF["red"], COLOUR_OF["green"], COLOUR_OF["blue"])
 
 
 def triad(axes: Any, origin: Array, directions: Array, size: float, name: str) -> None:
     """Draw the x, y and z axes of a frame, given as columns, and its name."""
-    for axis, colour, letter in zip(directions.T, COLOURS, "xyz", strict=True):
+    for axis, colour, letter in zip(directions.T, AXIS_COLOURS, "xyz", strict=True):
         end = origin + size * axis
         axes.plot(*np.column_stack([origin, end]), color=colour, linewidth=2)
         axes.text(*(origin + 1.15 * size * axis), letter, color=colour, fontsize=8)
@@ -50,7 +50,7 @@ def draw_hand(axes: Any) -> None:
         *joints, tip = chain
         axes.plot(*chain.T, "-o", color="black", linewidth=3, markersize=4)
         tiles = settled.positions[settled.finger_of == i]
-        axes.scatter(*tiles.T, marker="s", s=25, color="tab:orange", depthshade=False)
+        axes.scatter(*tiles.T, marker="s", s=25, color=COLOUR_OF["amber"], depthshade=False)
         if i == 1:
             across = np.cross(up, frame.along)
             triad(axes, frame.joint, np.column_stack([frame.along, across, up]), 0.035, "F")
@@ -100,7 +100,7 @@ def main() -> None:
         axes.view_init(elevation, azimuth)
         axes.set_aspect("equal")
         axes.tick_params(labelsize=7)
-    figure.savefig(PICTURE, dpi=110)
+    write_picture(figure, PICTURE)
 
 
 if __name__ == "__main__":

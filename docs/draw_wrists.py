@@ -14,7 +14,7 @@ import numpy as np
 
 from draw_frames import finger_chain
 from hand_models import Pose, spiny_hand
-from hand_models.base import turns_about
+from hand_models.base import COLOUR_OF, turns_about, write_picture
 from hand_models.hand import FINGERS, SettledHand
 from planner import plan
 from planner.prepare import settle_hand
@@ -41,19 +41,19 @@ def draw(axes: Any, settled: SettledHand, hand: HandPlan) -> None:
         rest, after = (finger_chain(each, FINGERS.index(name)) for each in (settled, there))
         after = after @ moved.rotation.T + moved.position
         axes.plot(mm * rest[:, 0], mm * rest[:, 2], "-o", color="0.6", linewidth=2, markersize=3)
-        axes.plot(mm * after[:, 0], mm * after[:, 2], "-o", color="tab:blue", markersize=3)
+        axes.plot(mm * after[:, 0], mm * after[:, 2], "-o", color=COLOUR_OF["blue"], markersize=3)
     own = np.isin(settled.finger_of, [FINGERS.index(name) for name in SHOWN])
     for place, force in zip(hand.positions[own], hand.forces[own], strict=True):
         axes.annotate(
             "",
             (mm * place[0] + 0.4 * force[0], mm * place[2] + 0.4 * force[2]),
             (mm * place[0], mm * place[2]),
-            arrowprops={"arrowstyle": "->", "color": "tab:red"},
+            arrowprops={"arrowstyle": "->", "color": COLOUR_OF["red"]},
         )
     palm = settled.hand.palm_tiles
     axes.plot(mm * palm[:, 0], mm * palm[:, 2], "s", color="0.6", label="closed")
     shifted = palm @ moved.rotation.T + moved.position
-    axes.plot(mm * shifted[:, 0], mm * shifted[:, 2], "s", color="tab:blue", label="settled")
+    axes.plot(mm * shifted[:, 0], mm * shifted[:, 2], "s", color=COLOUR_OF["blue"], label="settled")
 
 
 def main() -> None:
@@ -77,14 +77,14 @@ def main() -> None:
         label="rock, 300 mm",
     )
     draw(axes, settled, hand)
-    axes.plot([], [], color="tab:red", label="tile forces, 2.5 N/mm")
+    axes.plot([], [], color=COLOUR_OF["red"], label="tile forces, 2.5 N/mm")
     axes.set_aspect("equal")
     axes.set_xlabel("x of H [mm]")
     axes.set_ylabel("z of H, into the rock [mm]")
     axes.set_title(f"{LIMB} of wall-300: one inner and one outer finger, palm")
     axes.set_ylim(-25.0, 150.0)
     axes.legend(loc="upper center", ncols=2)
-    figure.savefig(PICTURE, dpi=150)
+    write_picture(figure, PICTURE)
 
 
 if __name__ == "__main__":

@@ -53,4 +53,9 @@ from .orientations import (
     check_orientation_form as check_orientation_form,
     oriented_pose as oriented_pose,
 )
+from .pictures import (
+    COLOUR_OF as COLOUR_OF,
+    SERIES_COLOURS as SERIES_COLOURS,
+    write_picture as write_picture,
+)
 from .tolerances import BASE_TOLERANCES as BASE_TOLERANCES, BaseTolerances as BaseTolerances

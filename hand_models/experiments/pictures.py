@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from hand_models.base import COLOUR_OF
 from hand_models.experiments.force_limits import MEASURE_UNITS, Measure
 from hand_models.finger import PHALANGES
 
@@ -26,11 +27,17 @@ __all__ = [
     "panels",
 ]
 
-PHALANX_COLOURS: Final = dict(zip(PHALANGES, ("tab:red", "tab:green", "tab:blue"), strict=True))
+PHALANX_COLOURS: Final = dict(
+    zip(
+        PHALANGES,
+        (COLOUR_OF["red"], COLOUR_OF["green"], COLOUR_OF["blue"]),
+        strict=True,
+    )
+)
 """Colour of each phalanx in every picture; for failures the paper also uses red and blue."""
 
 STATE_COLOURS: Final = {
-    "contact fails": ("tab:blue", "closing alone overloads a tile"),
+    "contact fails": (COLOUR_OF["blue"], "closing alone overloads a tile"),
     "ejects": ("navy", "the gripper ejects itself"),
     "no grasp": ("0.6", "no such grasp"),
 }

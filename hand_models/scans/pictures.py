@@ -14,7 +14,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
-from hand_models.base import Array, Indices, Pose, whole_file
+from hand_models.base import COLOUR_OF, Array, Indices, Pose, write_picture
 from hand_models.rock import Triangles
 from hand_models.scans.rock import ScannedRock
 
@@ -97,7 +97,7 @@ def plot_holds(
     shown = axes.scatter(points[:, 1], points[:, 0], c=values, norm=_scale(values), **style)
     for marker, (kind, at) in zip(cycle("xs^Dv+o*p"), refused.items(), strict=False):
         size: dict[str, Any] = {"markersize": 6, "markeredgewidth": 1.5, "fillstyle": "none"}
-        axes.plot(at[:, 1], at[:, 0], marker, color="tab:cyan", label=kind, **size)
+        axes.plot(at[:, 1], at[:, 0], marker, color=COLOUR_OF["sky"], label=kind, **size)
     _rank(axes, best, 0.06 * float(np.ptp(rock.vertices[:, :2], axis=0).max()))
     _write(axes, shown, label, path)
 
@@ -110,8 +110,7 @@ def _write(axes: Axes, colours: Any, label: str, path: Path) -> None:
         wide = max(map(len, labels)) > 40  # two columns of so many letters fill the picture
         figure.legend(loc="outside lower center", ncols=1 if wide else 2)
     figure.colorbar(colours, ax=axes, shrink=0.7, label=label)
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=150)
+    write_picture(figure, path, 150)
 
 
 def _rank(axes: Axes, best: Sequence[Pose], length: float) -> None:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.base import Array, Progress
+from hand_models.base import COLOUR_OF, Array, Progress
 from hand_models.compliance import gripper_table
 from hand_models.experiments import (
     FITTED_FIGURES,
@@ -198,7 +198,7 @@ def plot(result: StudyResult) -> dict[str, Figure]:
     residuals = result.data["residuals"]
     for place, row in enumerate(residuals[::-1]):
         unit = row["wanted"]
-        colour = "tab:blue" if row["inside"] else "tab:red"
+        colour = COLOUR_OF["blue"] if row["inside"] else COLOUR_OF["red"]
         low, middle, high = (value / unit for value in row["foretold"])
         left.plot([low, high], [place, place], color=colour, linewidth=5.0, alpha=0.35)
         left.plot(middle, place, "|", color=colour, markersize=9)
@@ -218,8 +218,8 @@ def plot(result: StudyResult) -> dict[str, Figure]:
         low, high = number["plausible"]
         least, most = ((end - low) / (high - low) for end in number["of_sets"])
         best, recorded = ((number[k] - low) / (high - low) for k in ("best", "recorded"))
-        right.plot([least, most], [row, row], color="tab:blue", linewidth=5.0, alpha=0.35)
-        right.plot(best, row, "o", color="tab:blue")
+        right.plot([least, most], [row, row], color=COLOUR_OF["blue"], linewidth=5.0, alpha=0.35)
+        right.plot(best, row, "o", color=COLOUR_OF["blue"])
         right.plot(recorded, row, "D", markerfacecolor="none", markeredgecolor="black")
     right.set_yticks(rows, [number["name"] for number in numbers])
     right.set(

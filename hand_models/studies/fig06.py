@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from matplotlib.figure import Figure
 
-from hand_models.base import Array, Progress
+from hand_models.base import COLOUR_OF, Array, Progress
 from hand_models.experiments import PalmExperiment, StudyResult, StudyText, panels, track
 from hand_models.parameters import ParameterTable
 from hand_models.studies.settings import STUDY_SETTINGS
@@ -145,9 +145,9 @@ def plot(result: StudyResult) -> dict[str, Figure]:
     for place, c in enumerate(shown):
         without, held = (1e-3 * c[f"load_{key}_friction"] for key in ("without", "with"))
         bars.bar(place - 0.2, without, 0.4, color="0.7")
-        bars.bar(place + 0.2, held, 0.4, color="tab:blue")
+        bars.bar(place + 0.2, held, 0.4, color=COLOUR_OF["blue"])
         gain = f"{100 * c['gain']:+.0f} %"
-        bars.text(place + 0.2, held, gain, ha="center", va="bottom", color="tab:red")
+        bars.text(place + 0.2, held, gain, ha="center", va="bottom", color=COLOUR_OF["red"])
     bars.set_xticks(range(len(shown)), ["-".join(map(str, c["springs"])) for c in shown])
     bars.set_ylim(0.0, 1.2e-3 * max(c["load_with_friction"] for c in shown))
     names = ("bearings, μ = 0", f"fixed rods, μ = {data['friction']:g}")
@@ -160,7 +160,9 @@ def plot(result: StudyResult) -> dict[str, Figure]:
         over_friction.axvline(curve["best_friction"], color=colour, linestyle=":", linewidth=1.0)
         gains = 100.0 * curve["gain_over_preload_stiffness"]
         over_springs.plot(1e-3 * data["preload_axis"], gains, style, color=colour, label=name)
-    over_springs.axhline(100.0 * STUDY_SETTINGS.fig06_printed_gain, color="tab:red", linewidth=1.0)
+    over_springs.axhline(
+        100.0 * STUDY_SETTINGS.fig06_printed_gain, color=COLOUR_OF["red"], linewidth=1.0
+    )
     used = 1e-3 * data["preload_stiffness"]
     over_springs.axvline(used, color="0.4", linestyle="--", linewidth=1.0)
     over_springs.set_ylim(0.0, None)

@@ -10,14 +10,17 @@ import numpy as np
 import scipy
 from matplotlib.figure import Figure
 
-from hand_models.base import Progress
+from hand_models.base import COLOUR_OF, Progress
 from hand_models.experiments import PalmExperiment, StudyResult, StudyText, panels, track
 from hand_models.parameters import ParameterTable, experiment_table
 from hand_models.studies.settings import STUDY_SETTINGS
 
 __all__ = ["plot", "run"]
 
-ROD_VARIANTS: Final = {"tiles": (False, "tab:blue"), "tiles and palm": (True, "tab:orange")}
+ROD_VARIANTS: Final = {
+    "tiles": (False, COLOUR_OF["blue"]),
+    "tiles and palm": (True, COLOUR_OF["green"]),
+}
 """Which pulleys are fixed rods: True if the palm's pulleys are rods, too, and the colour."""
 
 Loaded = list[dict[str, Any]]
@@ -164,7 +167,7 @@ def _draw_sequences(data: dict[str, Any]) -> Figure:
     loads.set_ylim(top=1.35 * loads.get_ylim()[1])
     loads.legend(loc="upper left", ncols=3)
     printed = 100.0 * STUDY_SETTINGS.fig07_printed_gain
-    gains.axhline(printed, color="tab:red", linewidth=1.0, label="printed, at least")
+    gains.axhline(printed, color=COLOUR_OF["red"], linewidth=1.0, label="printed, at least")
     gains.axhline(0.0, color="black", linewidth=0.8)
     gains.set_xticks(places, ["".join(map(str, c["springs"])) for c in shown], rotation=90)
     gains.set_xlim(-0.8, len(shown) - 0.2)
@@ -193,7 +196,9 @@ def _draw_dependence(data: dict[str, Any]) -> Figure:
                 reached = f"{r['reach_printed']}/{r['configurations']}"
                 style = {"xytext": (6, 3), "textcoords": "offset points", "fontsize": 8}
                 axes.annotate(reached, (place, spot), **style)
-        axes.axhline(100.0 * STUDY_SETTINGS.fig07_printed_gain, color="tab:red", linewidth=1.0)
+        axes.axhline(
+            100.0 * STUDY_SETTINGS.fig07_printed_gain, color=COLOUR_OF["red"], linewidth=1.0
+        )
         axes.axhline(0.0, color="black", linewidth=0.8)
     softest, springs = both
     softest.set_xticks(range(1, STUDY_SETTINGS.fig07_tiles))

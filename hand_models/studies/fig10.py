@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 from matplotlib.figure import Figure
 
-from hand_models.base import Array, Progress
+from hand_models.base import COLOUR_OF, Array, Progress
 from hand_models.experiments import StudyResult, StudyText, panels
 from hand_models.parameters import ParameterTable
 from hand_models.studies.settings import STUDY_SETTINGS
@@ -219,15 +219,23 @@ def _draw_curve(data: dict[str, Any]) -> Figure:
     low, _, high = data["array"]["quantiles_5_50_95"]
     strengths, curve = data["trials"]["strength"], data["array"]["angle"]
     at = np.repeat(data["trials"]["angle"], strengths.shape[1])
-    dots = {"marker": ".", "linestyle": "", "color": "tab:blue", "alpha": 0.6}
+    dots = {"marker": ".", "linestyle": "", "color": COLOUR_OF["blue"], "alpha": 0.6}
     dotted = {"linestyle": ":", "color": "k"}
     polar.axvspan(-30.0, 0.0, color="0.9")
-    polar.fill_between(np.degrees(curve), low, high, color="tab:blue", alpha=0.15, linewidth=0.0)
+    polar.fill_between(
+        np.degrees(curve), low, high, color=COLOUR_OF["blue"], alpha=0.15, linewidth=0.0
+    )
     cartesian.axhspan(0.0, -20.0, color="0.9")
     for angles, strength, label, of_points, style in (
         (at, strengths.ravel(), None, "70 simulated trials", dots),
-        (fitted, line, "Eq. 21 fitted to the trials", None, {"color": "tab:red"}),
-        (curve, data["array"]["mean"], "spine array, mean", None, {"color": "tab:blue"}),
+        (fitted, line, "Eq. 21 fitted to the trials", None, {"color": COLOUR_OF["red"]}),
+        (
+            curve,
+            data["array"]["mean"],
+            "spine array, mean",
+            None,
+            {"color": COLOUR_OF["blue"]},
+        ),
         (curve, data["planner"]["law"], "planner, Eq. 21", None, {"color": "k"}),
         (curve, data["planner"]["half_plane"], "planner, half-planes", None, dotted),
     ):
@@ -254,7 +262,9 @@ def _draw_table(data: dict[str, Any]) -> Figure:
     for axes, concrete in zip(both, ("fine", "coarse"), strict=True):
         cells = [cell for cell in data["tile_shear"] if cell["concrete"] == concrete]
         ordered = itertools.groupby(cells, key=lambda cell: cell["backlash"])
-        for (backlash, group), colour in zip(ordered, ("tab:blue", "tab:orange"), strict=True):
+        for (backlash, group), colour in zip(
+            ordered, (COLOUR_OF["blue"], COLOUR_OF["green"]), strict=True
+        ):
             keys = ("spines", "mean", "error", "simulated_mean", "simulated_deviation")
             found = np.array([[row[key] for key in keys] for row in group])
             spines, mean, error, simulated, deviation = found.T
@@ -286,7 +296,11 @@ def _draw_surface() -> Figure:
             for n in (1, 4)
         )
         for radius, style, label in (
-            (drag * array.share(angle, azimuth), "tab:blue", "spine array, to its level"),
+            (
+                drag * array.share(angle, azimuth),
+                COLOUR_OF["blue"],
+                "spine array, to its level",
+            ),
             (surface.strength(angle, azimuth), "k-", "planner's surface"),
             (one, "k:", "half-planes: 1"),
             (four, "k--", "half-planes: 4"),

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.base import Array, Progress
+from hand_models.base import COLOUR_OF, Array, Progress
 from hand_models.compliance import FingerLoads, Gripper, gripper_table
 from hand_models.experiments import (
     FIT_TOLERANCES,
@@ -199,7 +199,7 @@ def plot(result: StudyResult) -> dict[str, Figure]:
         axes.set_ylim(min(0.0, 1.2 * min(slip[kind])), None)
         axes.legend(title=f"×: a tile lets go, {slip['pull']:.1f} N")
     condition.plot(data["pull"], data["condition"], color="k")
-    condition.axhline(data["condition_printed"], color="tab:red", linewidth=1.0)
+    condition.axhline(data["condition_printed"], color=COLOUR_OF["red"], linewidth=1.0)
     text.label(condition, "condition")
     condition.set_ylim(0.0, 1.2 * max(*data["condition"], data["condition_printed"]))
     return {"fig12": figure}

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from trimesh.remesh import subdivide
 
-from hand_models.base import Array, Progress
+from hand_models.base import COLOUR_OF, Array, Progress
 from hand_models.compliance import PLANAR_COMPONENTS, Gripper, gripper_table, linear_extreme, pieces
 from hand_models.experiments import (
     FIT_TOLERANCES,
@@ -241,10 +241,10 @@ def plot(result: StudyResult) -> dict[str, Figure]:
         (side, "side", 1, np.array([side_x]), np.array([side_z])),
     ):
         outline = points[hull(points[:, [0, second]]).vertices]
-        axes.fill(outline[:, 0], outline[:, second], color="tab:blue", alpha=0.2)
+        axes.fill(outline[:, 0], outline[:, second], color=COLOUR_OF["blue"], alpha=0.2)
         axes.plot(pulled[:, 0], pulled[:, second], ".", color="0.4", markersize=3)
         mirrored = y if second == 1 else -y
-        axes.plot([*x, *-x], [*y, *mirrored], "x", color="tab:red", label="read off Fig. 13")
+        axes.plot([*x, *-x], [*y, *mirrored], "x", color=COLOUR_OF["red"], label="read off Fig. 13")
         text.label(axes, name)
         axes.grid(alpha=0.3)
         axes.legend(loc="lower right")
@@ -284,5 +284,5 @@ def _draw_strength(axes: Any, data: dict[str, Any]) -> None:
     above = np.clip(np.searchsorted(field["moment"], best["best_moment"]), 1, len(drawn) - 1)
     inside = drawn[above, columns] & drawn[above - 1, columns]
     line = np.where(inside, best["best_moment"], np.nan)
-    axes.plot(best["force_x"], line, color="tab:red", label="best M_y for each F_x")
+    axes.plot(best["force_x"], line, color=COLOUR_OF["red"], label="best M_y for each F_x")
     axes.legend(loc="upper left")

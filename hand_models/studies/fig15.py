@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 from matplotlib.figure import Figure
 
-from hand_models.base import Array, EmptySetError, InvalidInputError, Progress
+from hand_models.base import COLOUR_OF, Array, EmptySetError, InvalidInputError, Progress
 from hand_models.compliance import Gripper, gripper_table
 from hand_models.experiments import (
     Conditions,
@@ -212,7 +212,9 @@ def plot(result: StudyResult) -> dict[str, Figure]:
     data, tension, text = result.data, result.data["tension"], StudyText("fig15")
     figure, both = panels(1, 2, (12.0, 4.8))
     for axes, force in zip(both, ("shear", "normal"), strict=True):
-        for curve, colour in zip(data["curves"], ("tab:blue", "tab:red"), strict=True):
+        for curve, colour in zip(
+            data["curves"], (COLOUR_OF["blue"], COLOUR_OF["red"]), strict=True
+        ):
             values, fails = curve[force], curve["closing_alone_fails_at"]
             held = np.where(np.array(curve["state"]) == "holds", values, np.nan)
             name = f"{1e3 * curve['diameter']:g} mm"

@@ -20,7 +20,7 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-from hand_models.base import InvalidInputError, Progress, whole_file
+from hand_models.base import InvalidInputError, Progress, whole_file, write_picture
 from hand_models.experiments import StudyResult
 from hand_models.parameters import ParameterTable, hand_table
 
@@ -129,6 +129,5 @@ def run_study(
         part.write_text(text + "\n", encoding="utf-8")
     for picture, figure in study.plot(result).items():
         files.append(folder / f"{picture}.png")
-        with whole_file(files[-1]) as part:
-            figure.savefig(part, dpi=130, bbox_inches="tight", facecolor="white")
+        write_picture(figure, files[-1], 130, bbox_inches="tight")
     return replace(result, data=json.loads(text)["data"]), files

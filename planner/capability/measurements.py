@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.base import Array, EmptySetError, InvalidInputError, Progress
+from hand_models.base import COLOUR_OF, Array, EmptySetError, InvalidInputError, Progress
 from hand_models.compliance import Gripper, gripper_table
 from hand_models.experiments import StudyResult, panels, pull, pulled_off_poses, track
 from hand_models.parameters import (
@@ -226,7 +226,12 @@ class MeasurementStudy:
         rows = result.data["measurements"][::-1]
         places = np.arange(len(rows))
         figure, (axes,) = panels(1, 1, (8.5, 0.38 * len(rows) + 1.8), grid="x")
-        axes.barh(places, [each["width"] for each in rows], color="tab:blue", label="measured")
+        axes.barh(
+            places,
+            [each["width"] for each in rows],
+            color=COLOUR_OF["blue"],
+            label="measured",
+        )
         chance = [each["chance"] for each in rows]
         axes.plot(chance, places, "k|", markersize=14, label="with unrelated numbers, by chance")
         for name in result.data["stances"]:

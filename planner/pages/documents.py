@@ -39,7 +39,11 @@ def document(title: str, data: dict[str, Any]) -> str:
             f"a page needs plotly, which is not installed: {to_install('view')}"
         ) from None
     packed = b64encode(gzip.compress(get_plotlyjs().encode(), mtime=0)).decode()
-    colours = {"utilisation": PICTURE_SETTINGS.utilisation, "overload": PICTURE_SETTINGS.overload}
+    colours = {
+        "utilisation": PICTURE_SETTINGS.utilisation,
+        "overload": PICTURE_SETTINGS.overload,
+        "dark_overload": PICTURE_SETTINGS.dark_overload,
+    }
     text = msgspec.json.encode(data | {"title": title, "colours": colours}).decode()
     parts = {
         "title": escape(title),

@@ -7,6 +7,8 @@ for (const group of data.groups ?? []) shownKinds[group.name] = true;
 const moreTraces = []; // functions of a scene
 let at = data.crux ?? 0, order = {}, drawnAdvice = null, ranges;
 
+const dark = matchMedia("(prefers-color-scheme: dark)"), { overload, dark_overload } = data.colours;
+Object.defineProperty(data.colours, "overload", { get: () => dark.matches ? dark_overload : overload });
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 const made = (tag, text, kind) => Object.assign(document.createElement(tag), { textContent: text ?? "", className: kind ?? "" });
 const words = (name) => name.replaceAll("_", " ");
@@ -366,7 +368,7 @@ async function start() {
   }
   await show(Object.values(views)[0]);
   if (data.stages.length > 1) byId("margin").on("plotly_click", (event) => go(event.points[0].x));
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show());
+  dark.addEventListener("change", () => show());
 }
 
 function unable(error) {

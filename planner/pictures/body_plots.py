@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.base import Array, whole_file
+from hand_models.base import Array, write_picture
 from planner.capability import OTHER_COMPONENTS, WRENCH_COMPONENTS, BodySection, BodySpace, Polygon
 from planner.pictures.settings import PICTURE_SETTINGS
 
@@ -56,19 +58,28 @@ def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: s
     outlines = [_accelerations(space, view) for view in views]
     drawn = [(view, outline) for view, outline in zip(views, outlines, strict=True) if outline]
     count = 1 + len(drawn)
-    figure = Figure(figsize=(1.0 + 5.6 * count, 6.4), layout="constrained")
-    panels = figure.subplots(1, count, squeeze=False)[0]
+    # in rows of two, which a page has room for without making texts small
+    rows, columns = math.ceil(count / 2), min(count, 2)
+    figure = Figure(figsize=(3.6 * columns, 0.5 + 3.9 * rows), layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes in panels[count:]:
+        axes.remove()
     _draw_section(panels[0], space, section)
-    for axes, (view, outline) in zip(panels[1:], drawn, strict=True):
+    for axes, (view, outline) in zip(panels[1:count], drawn, strict=True):
         _draw_accelerations(axes, space, view, outline)
+    for axes in panels[:count]:
+        axes.title.set_fontsize(9)
+        axes.tick_params(labelsize=8)
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.label.set_fontsize(8)
     used = space.plan.utilisation
     asked = "" if used is None else f", utilisation {used:.2f}"
     about = f"the body wrench asked for: {space.plan.status}{asked}"
     if not space.exact:
         about += "; floating hands' sets linearised where the plan puts their wrists"
-    figure.suptitle(f"{title}: what the body can bear\n{about}", fontsize=11, parse_math=False)
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=120, facecolor="white")
+    about = textwrap.fill(about, 52 * columns)
+    figure.suptitle(f"{title}: what the body can bear\n{about}", fontsize=9, parse_math=False)
+    write_picture(figure, path, 120)
 
 
 def _accelerations(space: BodySpace, view: _View) -> Polygon | None:
@@ -102,7 +113,7 @@ def _draw_section(axes: Axes, space: BodySpace, section: BodySection) -> None:
         place = weight[indices]
         if np.linalg.norm(place) > 0.0:
             axes.plot(*np.vstack([np.zeros(2), place]).T, color=gravity, linewidth=1.2)
-        label = ("" if moves else "asked for: ") + "holds the weight at rest" + beside
+        label = ("" if moves else "asked for: ") + "holds the weight" + beside
         axes.plot(*place, "o", color=gravity, markersize=9, fillstyle="none", label=label)
     if weight is None or moves:
         label = "asked for" + beside
@@ -149,7 +160,7 @@ def _draw_accelerations(axes: Axes, space: BodySpace, view: _View, outline: Poly
 
 def _draw_legend(axes: Axes) -> None:
     """Draw a legend below the panel, beside what is drawn."""
-    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.11), ncols=2)
+    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2)
 
 
 def draw_polygon(axes: Axes, polygon: Polygon) -> None:

@@ -17,7 +17,14 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from hand_models.base import Array, InvalidInputError, Pose, whole_file
+from hand_models.base import (
+    COLOUR_OF,
+    SERIES_COLOURS,
+    Array,
+    InvalidInputError,
+    Pose,
+    write_picture,
+)
 from hand_models.rock import Mesh
 from planner.capability import BodySpace, com_region
 from planner.climbs import FoundClimb
@@ -45,7 +52,7 @@ def draw_climb(climb: Climb, result: RouteResult) -> Figure:
         among them.
     """
     shown = _shown(climb)
-    figure, panels, lower = _panels(len(shown), height=2.9, below=3.6)
+    figure, panels, lower = _panels(len(shown), height=2.4, below=3.2)
     FigureCanvasAgg(figure)  # which measures texts
     seen = view_directions(result.stages[0].question.stance)
     right = np.cross(seen.ahead, WORLD_UP)
@@ -67,7 +74,7 @@ def draw_climb(climb: Climb, result: RouteResult) -> Figure:
                 artist.set_clip_on(True)
         way = np.array([_hand(each, knot.limb) for each in _swing_to(climb, knot)])
         if len(way) > 1:
-            axes.plot(*flat(way).T, ".-", color="tab:orange", markersize=3, zorder=9)
+            axes.plot(*flat(way).T, ".-", color=COLOUR_OF["purple"], markersize=3, zorder=9)
     places = [hand.pose.position for knot in climb.knots for hand in knot.hands]
     places += [knot.body.position for knot in climb.knots]
     extent = flat(np.array(places))
@@ -84,7 +91,7 @@ def draw_climb(climb: Climb, result: RouteResult) -> Figure:
     )
     side = "above" if seen.steep and seen.into[2] < 0.0 else "below" if seen.steep else "behind"
     figure.suptitle(
-        f"{climb.route.name}: seen from {side}, across and up in W [m]; orange: way of the hand",
+        f"{climb.route.name}: seen from {side}, across and up in W [m]; purple: way of the hand",
         fontsize=11,
         parse_math=False,
     )
@@ -112,7 +119,7 @@ def draw_support(climb: Climb, result: RouteResult) -> Figure | None:
         regions = [com_region(space) for space in spaces]
     except InvalidInputError:
         return None
-    figure, panels, _ = _panels(len(shown), height=2.9, below=0.0)
+    figure, panels, _ = _panels(len(shown), height=2.4, below=0.0)
     places: list[Array] = []
     for axes, knot, region in zip(panels, shown, regions, strict=True):
         if region.polygon is not None:
@@ -167,7 +174,7 @@ def plot_wall(found: FoundClimb, rock: Mesh, rock_pose: Pose, path: Path) -> Non
         places = np.array([pose.position for pose in poses]).reshape(-1, 3)
         return np.asarray(into_rock.apply(places)[:, [1, 0]])
 
-    figure = Figure(figsize=(13.0, 7.5), layout="constrained")
+    figure = Figure(figsize=(11.0, 6.6), layout="constrained")
     axes, lower = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
     vertices = rock.triangles.vertices
     axes.hexbin(*vertices[:, [1, 0]].T, C=-vertices[:, 2], gridsize=60, cmap="gray", linewidths=0.1)
@@ -185,35 +192,46 @@ def plot_wall(found: FoundClimb, rock: Mesh, rock_pose: Pose, path: Path) -> Non
             route = climb.route
             hands = [*route.start.hands, *(move.hand for move in route.moves)]
             own = flat([hand.pose for hand in hands if hand.limb == limb])
-            style: dict[str, Any] = {"color": f"C{i}", "markersize": 9, "markerfacecolor": "none"}
+            style: dict[str, Any] = {
+                "color": SERIES_COLOURS[i % len(SERIES_COLOURS)],
+                "markersize": 9,
+                "markerfacecolor": "none",
+            }
             axes.plot(*own.T, "o-", label=limb.replace("_", " "), **style)
         bodies = flat([knot.body for knot in climb.knots])
         axes.plot(*bodies.T, "--", color="black", linewidth=1.2, label="the body")
         axes.plot(*bodies[0], "s", color="black", markersize=5)
     if deciding is not None:
         at = flat([wall.places[place].pose for place in deciding.placements.values()])
-        axes.plot(*at.T, "*", color="tab:red", markersize=13, label="hands of the deciding stage")
-        axes.plot(*flat([wall.bodies[deciding.body]]).T, "P", color="tab:red", markersize=8)
+        axes.plot(
+            *at.T,
+            "*",
+            color=COLOUR_OF["red"],
+            markersize=13,
+            label="hands of the deciding stage",
+        )
+        axes.plot(*flat([wall.bodies[deciding.body]]).T, "P", color=COLOUR_OF["red"], markersize=8)
     axes.set(aspect="equal", xlabel="across [m]", ylabel="up the rock [m]")
     axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=4, frameon=False)
     _draw_factors(lower, found)
     figure.suptitle(f"{len(wall.places)} placements, {len(wall.bodies)} poses of the body")
-    with whole_file(path) as part:
-        figure.savefig(part, format=path.suffix[1:].lower(), dpi=120)
+    write_picture(figure, path, 120)
 
 
 def _draw_factors(axes: Any, found: FoundClimb) -> None:
     """Draw the load factors of a climb's states and stages, and the bound of other climbs."""
     if math.isfinite(found.bound):
         label = f"no climb has more in all stages: {found.bound:.3f}"
-        axes.axhline(found.bound, color="tab:red", linestyle="--", label=label)
+        axes.axhline(found.bound, color=COLOUR_OF["red"], linestyle="--", label=label)
     if found.result is not None:
         factors = [p.load_factor for p in found.result.plans]
         known = [np.nan if factor is None else factor for factor in factors]
         axes.plot(known, ".-", color="black", label="stages as planned")
     if found.deciding is not None:
         here = found.deciding.stage, found.deciding.load_factor
-        axes.plot(*here, "*", color="tab:red", markersize=13, label=f"decides: {here[1]:.3f}")
+        axes.plot(
+            *here, "*", color=COLOUR_OF["red"], markersize=13, label=f"decides: {here[1]:.3f}"
+        )
     if found.result is None:
         said = {"none": "proven: there is no climb", "blocked": "no moves of a climb have a plan"}
         axes.text(0.5, 0.5, said.get(found.status, "no climb was found in time"), ha="center")
@@ -230,20 +248,22 @@ def _draw_margins(axes: Any, climb: Climb) -> None:
     """Draw utilisations of knots and the bounds between them, with phases and moves."""
     times = np.array([knot.time for knot in climb.knots])
     phases: tuple[str, ...] = get_args(KnotPhase)
+    # light, so that curves are seen on them
+    tints = colormaps["YlGnBu"](np.linspace(0.0, 0.5, len(phases)))
     named: set[str] = set()
     for before, knot in pairwise(climb.knots):
-        colour = colormaps["Pastel1"](phases.index(knot.phase))
+        colour = tints[phases.index(knot.phase)]
         label = None if knot.phase in named else knot.phase
         named.add(knot.phase)
         axes.axvspan(before.time, knot.time, color=colour, linewidth=0.0, label=label)
         if knot.bound is not None:
             ends = [before.time, knot.time]
             style = {} if knot.index != climb.knots[1].index else {"label": "bound between knots"}
-            axes.plot(ends, [knot.bound] * 2, color="tab:red", linewidth=1.5, **style)
+            axes.plot(ends, [knot.bound] * 2, color=COLOUR_OF["red"], linewidth=1.5, **style)
     used = [knot.utilisation for knot in climb.knots]
     axes.plot(times, used, ".-", color="black", linewidth=1.0, markersize=4, label="knots")
     cap = climb.route.limits.utilisation
-    axes.axhline(cap, color="tab:red", linestyle="--", label=f"limit {cap:g}")
+    axes.axhline(cap, color=COLOUR_OF["red"], linestyle="--", label=f"limit {cap:g}")
     top = 1.15 * max(cap, *used, *(knot.bound or 0.0 for knot in climb.knots))
     begun = 0.0
     for number, group in groupby(climb.knots, key=lambda knot: knot.move):
@@ -255,7 +275,7 @@ def _draw_margins(axes: Any, climb: Climb) -> None:
         begun = end
     if climb.failure is not None:
         text = textwrap.fill(f"move {climb.failure.move} fails: {climb.failure.reason}", 60)
-        box = {"facecolor": "white", "edgecolor": "tab:red"}
+        box = {"facecolor": "white", "edgecolor": COLOUR_OF["red"]}
         axes.text(
             0.98, 0.05, text, transform=axes.transAxes, ha="right", va="bottom",
             multialignment="left", fontsize=8, bbox=box,
@@ -272,7 +292,7 @@ def _panels(count: int, height: float, below: float) -> tuple[Figure, list[Any],
     """
     columns = min(count, 6)
     rows = math.ceil(count / columns)
-    size = (max(2.5 * columns, 9.0), height * rows + below + 0.8)
+    size = (max(1.85 * columns, 9.0), height * rows + below + 0.8)
     figure = Figure(figsize=size, layout="constrained")
     ratios = [height] * rows + ([below] if below else [])
     grid = figure.add_gridspec(len(ratios), columns, height_ratios=ratios)
@@ -287,7 +307,7 @@ def _set_frame(panels: Sequence[Any], low: Array, high: Array) -> None:
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         axes.xaxis.set_major_locator(MaxNLocator(4))
         last = i + columns >= len(panels)
-        axes.tick_params(labelsize=7, labelleft=i % columns == 0, labelbottom=last)
+        axes.tick_params(labelsize=8, labelleft=i % columns == 0, labelbottom=last)
         axes.grid(alpha=0.3)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from hand_models.base import Array, whole_file
+from hand_models.base import COLOUR_OF, Array, write_picture
 from planner.capability import BodySpace, ComRegion, ComSolid
 from planner.pictures.body_plots import draw_polygon
 from planner.pictures.settings import PICTURE_SETTINGS
@@ -47,8 +47,7 @@ def plot_com_region(
         Number of accelerations under which the solid was sought; 0 if it was not.
     """
     figure = draw_com_region(space, region, title, solid, accelerations)
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=120, facecolor="white")
+    write_picture(figure, path, 120)
 
 
 def draw_com_region(
@@ -122,8 +121,10 @@ def _draw_solid(axes: Axes, region: ComRegion, solid: ComSolid | None, accelerat
     if corners is not None:
         outline = np.vstack([corners, corners[:1]])
         label = f"held under {accelerations} accelerations, at its height"
-        axes.fill(*corners.T, facecolor="none", edgecolor="tab:orange", hatch="//", alpha=0.4)
-        axes.plot(*outline.T, color="tab:orange", label=label)
+        axes.fill(
+            *corners.T, facecolor="none", edgecolor=COLOUR_OF["purple"], hatch="//", alpha=0.4
+        )
+        axes.plot(*outline.T, color=COLOUR_OF["purple"], label=label)
     inside = "inside" if solid.margin >= 0.0 else "outside"
     height = "" if corners is not None else ", which does not reach its height"
     return (

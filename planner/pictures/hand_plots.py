@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from hand_models.base import Array, whole_file
+from hand_models.base import COLOUR_OF, Array, write_picture
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, NAIL, SettledHand
 from hand_models.sections import Section
@@ -34,12 +34,12 @@ if TYPE_CHECKING:
 __all__ = ["direction_in_words", "draw_fingers", "draw_wrench_space", "plot_wrench_space"]
 
 CONTACT_STYLES: Final = {
-    "face": ("tab:green", "tile's face"),
-    "edge": ("tab:orange", "tile's edge"),
-    "frame": ("tab:purple", "bare frame"),
-    "slipped": ("tab:pink", "slipped tile"),
-    "nail": ("tab:red", "fingernail"),
-    "none": ("0.55", "no contact"),
+    "face": (COLOUR_OF["green"], "tile's face"),
+    "edge": (COLOUR_OF["purple"], "tile's edge"),
+    "frame": (COLOUR_OF["amber"], "bare frame"),
+    "slipped": (COLOUR_OF["sky"], "slipped tile"),
+    "nail": (COLOUR_OF["red"], "fingernail"),
+    "none": ("0.75", "no contact"),
 }
 
 
@@ -72,8 +72,7 @@ def plot_wrench_space(
         vertices.
     """
     figure = draw_wrench_space(settled, space, title, preload, outlined=outlined)
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=110, facecolor="white")
+    write_picture(figure, path, 110)
 
 
 def draw_wrench_space(
@@ -101,7 +100,7 @@ def draw_wrench_space(
         Whether projections are computed from the support function, not from vertices.
     """
     tensions = np.full(len(FINGERS), settled.closing_tension) if preload is None else preload
-    figure = Figure(figsize=(15.0, 7.6 if space is None else 12.2), layout="constrained")
+    figure = Figure(figsize=(11.5, 6.2 if space is None else 9.8), layout="constrained")
     heights = [1.0] if space is None else [1.0, 0.6]
     rows = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)
     upper = rows[0, 0]
@@ -204,10 +203,15 @@ def _draw_finger(
         "",
         (low[0] + 8.0 + PICTURE_SETTINGS.longest_force, low[1] + 8.0),
         (low[0] + 8.0, low[1] + 8.0),
-        arrowprops={"arrowstyle": "-|>", "color": "tab:red"},
+        arrowprops={"arrowstyle": "-|>", "color": COLOUR_OF["red"]},
     )
     axes.text(
-        low[0] + 8.0, low[1] + 11.0, f"{largest:.0f} N", va="top", color="tab:red", fontsize=8
+        low[0] + 8.0,
+        low[1] + 11.0,
+        f"{largest:.0f} N",
+        va="top",
+        color=COLOUR_OF["red"],
+        fontsize=8,
     )
     axes.set(
         title=f"{FINGERS[index].replace('_', ' ')}: plane {direction_in_words(frame.along)}",
@@ -216,7 +220,8 @@ def _draw_finger(
         xlim=(low[0], high[0]),
         ylim=(high[1], low[1]),
     )
-    axes.title.set_fontsize(10)
+    for text in (axes.title, axes.xaxis.label, axes.yaxis.label):
+        text.set_fontsize(9)
     axes.set_aspect("equal", adjustable="box")
 
 
@@ -263,7 +268,7 @@ def _draw_force(axes: Axes, place: Array, angle: float, load: Array, largest: fl
     if np.hypot(*force) > 0.02 * largest:
         axes.annotate(
             "", tuple(end), tuple(place),
-            arrowprops={"arrowstyle": "-|>", "color": "tab:red", "shrinkA": 0.0, "shrinkB": 0.0},
+            arrowprops={"arrowstyle": "-|>", "color": COLOUR_OF["red"], "shrinkA": 0, "shrinkB": 0},
         )  # fmt: skip
 
 
@@ -315,7 +320,7 @@ def _draw_from_above(axes: Axes, settled: SettledHand) -> None:
     frames = hand.frames(settled.grasp.outer_rotation)
     for name, frame, finger in zip(FINGERS, frames, settled.fingers, strict=True):
         ends = 1e3 * (frame.joint + np.outer([-0.06, 0.16], frame.along))
-        axes.plot(ends[:, 1], ends[:, 0], "--", color="tab:blue", lw=1.0)
+        axes.plot(ends[:, 1], ends[:, 0], "--", color=COLOUR_OF["blue"], lw=1.0)
         places = 1e3 * frame.joint + np.outer(1e3 * finger.chain[:, 0], frame.along)
         axes.plot(places[:, 1], places[:, 0], "o-", color="0.25", markersize=4, lw=2.5)
         outward = places[-1] - places[0]
@@ -324,7 +329,7 @@ def _draw_from_above(axes: Axes, settled: SettledHand) -> None:
             (places[-1, 1], places[-1, 0]),
             xytext=tuple(18.0 * outward[[1, 0]] / max(float(np.hypot(*outward[:2])), 1.0)),
             textcoords="offset points",
-            color="tab:blue",
+            color=COLOUR_OF["blue"],
             fontsize=8,
             ha="center",
             va="center",
@@ -372,8 +377,8 @@ def _draw_projection(axes: Axes, points: Array, i: int, j: int) -> None:
         outline = points[scipy.spatial.ConvexHull(points).vertices]
     except scipy.spatial.QhullError:
         outline = points[np.lexsort(points.T)][[0, -1]]
-    axes.fill(*outline.T, alpha=0.35, color="tab:blue")
-    axes.plot(*np.vstack([outline, outline[:1]]).T, color="tab:blue")
+    axes.fill(*outline.T, alpha=0.35, color=COLOUR_OF["blue"])
+    axes.plot(*np.vstack([outline, outline[:1]]).T, color=COLOUR_OF["blue"])
     axes.axhline(0.0, color="0.5", linewidth=0.8)
     axes.axvline(0.0, color="0.5", linewidth=0.8)
     (a, unit_a), (b, unit_b) = symbol_of(WRENCH_COMPONENTS[i]), symbol_of(WRENCH_COMPONENTS[j])

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
-from hand_models.base import whole_file
+from hand_models.base import COLOUR_OF, SERIES_COLOURS, write_picture
 
 if TYPE_CHECKING:
     from hand_models.opening import HandPath
@@ -27,7 +27,7 @@ def plot_opening(opening: HandPath, path: Path, title: str) -> None:
     title : str
     """
     names = [f"{each.finger} {each.phalanx}" for each in opening.events]
-    figure = Figure(figsize=(10.0, 7.0 + 0.22 * len(names)), layout="constrained")
+    figure = Figure(figsize=(7.5, 5.6 + 0.2 * len(names)), layout="constrained")
     forces, moments, tiles = figure.subplots(
         3, 1, sharex=True, height_ratios=(3.0, 2.0, 1.0 + 0.22 * len(names))
     )
@@ -37,13 +37,14 @@ def plot_opening(opening: HandPath, path: Path, title: str) -> None:
         (moments, 3, ("mx", "my", "mz"), "moment [N·m]"),
     ):
         for k, component in enumerate(names_of, first):
-            axes.plot(tension, opening.wrenches[:, k], "o-", markersize=4, label=component)
+            style: dict[str, Any] = {"color": SERIES_COLOURS[k % 3], "marker": "os^"[k % 3]}
+            axes.plot(tension, opening.wrenches[:, k], markersize=4, label=component, **style)
         axes.set_ylabel(unit)
         axes.axhline(0.0, color="0.7", linewidth=0.8)
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     for row, event in enumerate(opening.events):
-        tiles.plot([tension[0], event.tension], [row, row], color="tab:blue", linewidth=3.0)
-        tiles.plot(event.tension, row, "x", color="tab:red")
+        tiles.plot([tension[0], event.tension], [row, row], color=COLOUR_OF["blue"], linewidth=3.0)
+        tiles.plot(event.tension, row, "x", color=COLOUR_OF["red"])
         for axes in (forces, moments):
             axes.axvline(event.tension, color="0.85", linewidth=0.8, zorder=0)
     tiles.set_yticks(range(len(names)), names, fontsize=8)
@@ -54,5 +55,4 @@ def plot_opening(opening: HandPath, path: Path, title: str) -> None:
     if opening.resting:
         said.append(f"pressed on the rock by springs at the end: {', '.join(opening.resting)}")
     figure.suptitle("\n".join([f"{title}: the hand opens", *said]), fontsize=11, parse_math=False)
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=110, facecolor="white")
+    write_picture(figure, path, 110)

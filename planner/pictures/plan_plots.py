@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 from mpl_toolkits.mplot3d import proj3d
 
-from hand_models.base import Array, whole_file
+from hand_models.base import Array, write_picture
 from planner.pictures.plan_scene import (
     WORLD_UP,
     DrawnScene,
@@ -54,8 +54,7 @@ def plot_plan(plan: Plan, question: Question, path: Path) -> None:
     path : Path
         Picture file; its suffix, PNG, PDF or SVG, is the format.
     """
-    with whole_file(path) as part:
-        draw_plan(plan, question).savefig(part, dpi=130, facecolor="white")
+    write_picture(draw_plan(plan, question), path, 130)
 
 
 def draw_plan(plan: Plan, question: Question) -> Figure:
@@ -73,34 +72,34 @@ def draw_plan(plan: Plan, question: Question) -> Figure:
     joints = joint_utilisations(plan, question.stance)
     # edges of the panels, over the picture's height
     bottom, top = 0.075, 0.875
-    # inches, of which a row of a table needs a tenth
-    needed = 0.105 * (rows + len(joints)) / (top - bottom)
-    figure = Figure(figsize=(14.0, max(8.0, needed)))
+    # inches, of which a row of a table needs an eighth
+    needed = 0.118 * (rows + len(joints)) / (top - bottom)
+    figure = Figure(figsize=(12.0, max(7.2, needed)))
     FigureCanvasAgg(figure)  # which measures texts
     places = {"bottom": bottom, "top": top}
     under = 0.0
     if plan.spread is not None and plan.spread.load_factor is not None:
-        draw_spread(figure.add_axes((0.045, bottom, 0.165, 0.11)), plan.spread, plan.load_factor)
-        draw_answers(figure.add_axes((0.275, bottom, 0.11, 0.11)), plan.spread)
+        draw_spread(figure.add_axes((0.045, bottom, 0.14, 0.11)), plan.spread, plan.load_factor)
+        draw_answers(figure.add_axes((0.265, bottom, 0.09, 0.11)), plan.spread)
         under = 0.3
-    space = figure.add_gridspec(1, 1, left=0.02, right=0.4, bottom=under, top=top)
+    space = figure.add_gridspec(1, 1, left=0.02, right=0.37, bottom=under, top=top)
     _draw_space(figure, space[0], scene, seen)
-    sides = figure.add_gridspec(2, 1, left=0.435, right=0.665, hspace=0.3, **places)
+    sides = figure.add_gridspec(2, 1, left=0.425, right=0.605, hspace=0.3, **places)
     _draw_sides(figure.add_subplot(sides[0]), figure.add_subplot(sides[1]), scene, seen)
     parts = (max(rows, 4), len(joints) + 0.5) if joints else (1.0,)
     tables = figure.add_gridspec(
-        len(parts), 1, left=0.785, right=0.94, height_ratios=parts, hspace=0.22, **places
+        len(parts), 1, left=0.75, right=0.93, height_ratios=parts, hspace=0.3, **places
     )
     if plan.hands:
         draw_tiles(figure.add_subplot(tables[0]), plan, question)
     else:
-        draw_shortfall(figure.add_axes((0.7, bottom, 0.28, top - bottom)), plan)
+        draw_shortfall(figure.add_axes((0.64, bottom, 0.34, top - bottom)), plan)
     if joints:
         draw_joints(figure.add_subplot(tables[1]), joints)
     if plan.hands:
         figure.colorbar(
             ScalarMappable(UTILISATION_NORM, UTILISATION_COLOURS),
-            cax=figure.add_axes((0.95, 0.3, 0.01, 0.4)),
+            cax=figure.add_axes((0.94, 0.3, 0.01, 0.4)),
             label="utilisation: load / capacity [1]",
             extend="max",
         )

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from hand_models.base import Array
+from hand_models.base import COLOUR_OF, Array
 from hand_models.hand import NAIL
 from planner.explanation import constraint_words, part_words
-from planner.pictures.plan_views import UTILISATION_COLOURS, UTILISATION_NORM
+from planner.pictures.plan_views import UTILISATION_COLOURS, UTILISATION_NORM, ink_on
 from planner.question import Question
 from planner.result import SPREAD_SETTINGS, Certificate, LimitName, Plan, Spread
 
@@ -96,8 +96,8 @@ def _draw_colours(axes: Any, values: Array, columns: Iterable[str], rows: Iterab
     axes.imshow(
         shown, cmap=UTILISATION_COLOURS, norm=UTILISATION_NORM, aspect="auto", interpolation="none"
     )
-    axes.set_xticks(range(values.shape[1]), list(columns), fontsize=6.5)
-    axes.set_yticks(range(values.shape[0]), list(rows), fontsize=7)
+    axes.set_xticks(range(values.shape[1]), list(columns), fontsize=8)
+    axes.set_yticks(range(values.shape[0]), list(rows), fontsize=8)
     axes.tick_params(length=0)
     titles = axes.get_xticklabels()
     widest = max(title.get_window_extent().width for title in titles)
@@ -108,11 +108,12 @@ def _draw_colours(axes: Any, values: Array, columns: Iterable[str], rows: Iterab
 
 def _write_numbers(axes: Any, values: Array, first: tuple[float, float] = (0.0, 0.0)) -> None:
     """Write numbers that are not NaN on their colours, the first at a row and a column."""
-    style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 7}
+    style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8}
     for (i, j), value in np.ndenumerate(values):
         if np.isfinite(value):
-            colour = "white" if value > 1.0 else "black"
-            text = f"{value:.{2 if value < 10.0 else 1 if value < 100.0 else 0}f}"
+            colour = ink_on(UTILISATION_COLOURS(UTILISATION_NORM(value)))
+            # as many digits as fit, of what is rounded up, too
+            text = f"{value:.{2 if value < 9.995 else 1 if value < 99.95 else 0}f}"
             text = text if value < 999.0 else "999+"
             axes.text(first[1] + j, first[0] + i, text, color=colour, **style)
 
@@ -216,14 +217,14 @@ def draw_answers(axes: Any, spread: Spread) -> None:
     holds = np.array([each.holds for each in there.values()])
     without = np.array([each.without for each in there.values()])
     parts = {
-        "feasible": (holds, "tab:green"),
-        "overloaded": (spread.draws - holds - without, "tab:orange"),
+        "feasible": (holds, COLOUR_OF["green"]),
+        "overloaded": (spread.draws - holds - without, COLOUR_OF["amber"]),
         "no balance": (without, "0.3"),
     }
     left = np.zeros(len(there))
     for words, (counts, colour) in parts.items():
         bars = axes.barh(list(there), counts, left=left, color=colour, label=words, height=0.7)
-        axes.bar_label(bars, [str(n or "") for n in counts], label_type="center", fontsize=7)
+        axes.bar_label(bars, [str(n or "") for n in counts], label_type="center", fontsize=8)
         left = left + counts
     axes.set(xlim=(0.0, spread.draws), xlabel="samples", ylim=(len(there) - 0.5, -0.5))
     axes.tick_params(labelsize=8)
@@ -233,7 +234,7 @@ def draw_answers(axes: Any, spread: Spread) -> None:
 def _legend_above(axes: Any) -> None:
     """Write the legend in a line above a small panel."""
     place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.03, 0.96), "ncols": 3}
-    axes.legend(fontsize=7, frameon=False, handlelength=1.0, columnspacing=0.8, **place)
+    axes.legend(fontsize=8, frameon=False, handlelength=1.0, columnspacing=0.8, **place)
 
 
 def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
@@ -255,14 +256,15 @@ def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
     ends = np.array([*factors, 1.0, *([] if nominal is None else [nominal])])
     many = len(factors) >= SPREAD_SETTINGS.many_draws
     axes.axvspan(low, high, color="0.88", label="5 to 95 %" if many else "all")
-    axes.hist(factors, np.linspace(ends.min(), ends.max(), 15 + 1), color="tab:blue")
-    axes.axvline(1.0, color="tab:red", linestyle="--", label="needed")
+    axes.hist(factors, np.linspace(ends.min(), ends.max(), 15 + 1), color=COLOUR_OF["blue"])
+    axes.axvline(1.0, color=COLOUR_OF["red"], linestyle="--", label="needed")
     if nominal is not None:
         axes.axvline(nominal, color="black", label="nominal")
     said, limit = f"feasible in {spread.holds} of {spread.draws} samples", spread.threshold
     if limit is not None and limit.shear_limit is not None:
         said = f"feasible where a tile on {limit.surface} holds {limit.shear_limit:.2g} N or more"
         said += f": {limit.share:.0%} of its range"
+    said = textwrap.fill(said, 56)
     if spread.cap < 1.0:
         said += f"\n(utilisation up to {spread.cap:g})"
     axes.set_title(said, fontsize=9, loc="left", pad=18.0)

@@ -18,7 +18,7 @@ from hand_models.base import Array
 from planner.pictures.plan_scene import DrawnScene
 from planner.pictures.settings import PICTURE_SETTINGS
 
-__all__ = ["UTILISATION_COLOURS", "UTILISATION_NORM", "View", "draw_scene", "silhouette"]
+__all__ = ["UTILISATION_COLOURS", "UTILISATION_NORM", "View", "draw_scene", "ink_on", "silhouette"]
 
 UTILISATION_COLOURS: Final = LinearSegmentedColormap.from_list(
     "load", PICTURE_SETTINGS.utilisation
@@ -27,6 +27,15 @@ UTILISATION_COLOURS: Final = LinearSegmentedColormap.from_list(
 
 UTILISATION_NORM: Final = Normalize(0.0, 1.0)
 """Range of utilisations that the colour map covers: 0 to 1."""
+
+
+def ink_on(colour: Any) -> str:
+    """Return in which colour text is written on a colour of matplotlib: black or white."""
+    red, green, blue = to_rgb(colour)
+    # of the colour as a grey, by which either has the same contrast with it, about
+    middle = 0.5
+    return "black" if 0.299 * red + 0.587 * green + 0.114 * blue > middle else "white"
+
 
 SCENE_STYLES: Final[dict[str, dict[str, Any]]] = {
     # convex surfaces; hands and rock are seen through the body
@@ -129,15 +138,16 @@ class View:
             self.axes.add_collection(collection(list(corners), clip_on=False, **style))
 
     def rock(self, triangles: Array) -> None:
-        """Draw rock triangles, shaded by a light source, the farthest first.
+        """Draw the triangles of one rock, shaded by a light source, the farthest first.
+
+        Those seen from inside the rock come before all others: where a long triangle of the back
+        is drawn over the front, it would leave a streak.
 
         Parameters
         ----------
         triangles : ndarray, shape (n, 3, 3)
-            Corners in world frame W [m].
+            Corners in world frame W [m], counterclockwise from outside.
         """
-        if not self.deep:
-            triangles = triangles[np.argsort(-(triangles @ self.look).mean(axis=1))]
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         size = np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)
         light = np.array([-0.5, -0.3, 0.8])  # from which it comes, in W
@@ -145,7 +155,12 @@ class View:
         # greys along the light, and across it
         dark, bright = 0.6, 0.92
         shades = np.repeat(dark + (bright - dark) * lit[:, None], 3, axis=1)
-        self.fill(triangles, facecolors=shades, edgecolors=shades, linewidth=0.8, zorder=1)
+        order = np.argsort(-(triangles @ self.look).mean(axis=1))
+        away = normals @ self.look > 0.0
+        for part in (order[away[order]], order[~away[order]]):
+            # edges of the same colour close the gaps that smoothing leaves between triangles
+            style: dict[str, Any] = {"facecolors": shades[part], "edgecolors": shades[part]}
+            self.fill(triangles[part], linewidth=0.8, joinstyle="round", zorder=1, **style)
 
     def arrow(self, start: Array, step: Array, colour: Any) -> tuple[Array, Array]:
         """Draw an arrow.
@@ -292,7 +307,9 @@ class View:
 
 def draw_scene(view: View, scene: DrawnScene, *, noted: bool = True) -> None:
     """Draw rock, hands, limbs, forces and, if ``noted``, names and sizes of a scene into a view."""
-    view.rock(np.concatenate([s.triangles for s in scene.surfaces if s.kind == "rock"]))
+    rocks = [s.triangles for s in scene.surfaces if s.kind == "rock" and len(s.faces)]
+    for triangles in sorted(rocks, key=lambda each: -float((each @ view.look).mean())):
+        view.rock(triangles)
     for kind in ("palm", "link", "body"):
         drawn = [s.vertices for s in scene.surfaces if s.kind == kind]
         outlines = [silhouette(vertices, view.look) for vertices in drawn]

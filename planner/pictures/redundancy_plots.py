@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from hand_models.base import whole_file
+from hand_models.base import write_picture
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS
+from planner.pictures.plan_views import ink_on
 from planner.result import Loss, Redundancy
 
 if TYPE_CHECKING:
@@ -38,20 +39,18 @@ def plot_redundancy(redundancy: Redundancy, path: Path, title: str) -> None:
 
     limbs = list(dict.fromkeys(loss.limb for loss in redundancy.losses))
     whole = "no plan" if redundancy.utilisation is None else f"{redundancy.utilisation:.3f}"
-    colours = ScalarMappable(Normalize(0.5, 1.5), "RdYlGn_r")
+    # the more the darker, as greys too; what is beyond the cap is bold
+    colours = ScalarMappable(Normalize(0.5, 1.5), "YlOrBr")
     height = -(-len(limbs) // 2)
-    with whole_file(path) as file:
-        figure = Figure(figsize=(10.0, 1.1 + 2.3 * height), layout="constrained")
-        grid = figure.subplots(height, min(len(limbs), 2), squeeze=False)
-        for axes, limb in zip(grid.ravel(), limbs, strict=False):
-            _hand(axes, [loss for loss in redundancy.losses if loss.limb == limb], colours)
-        for axes in grid.ravel()[len(limbs) :]:
-            axes.set_axis_off()
-        figure.suptitle(
-            f"{title}: utilisation without a part ({whole} with all; bold: beyond the cap)"
-        )
-        figure.colorbar(colours, ax=grid, label="utilisation [1]", extend="both", shrink=0.9)
-        figure.savefig(file, format=path.suffix[1:].lower(), dpi=120)
+    figure = Figure(figsize=(8.0, 1.1 + 2.1 * height), layout="constrained")
+    grid = figure.subplots(height, min(len(limbs), 2), squeeze=False)
+    for axes, limb in zip(grid.ravel(), limbs, strict=False):
+        _hand(axes, [loss for loss in redundancy.losses if loss.limb == limb], colours)
+    for axes in grid.ravel()[len(limbs) :]:
+        axes.set_axis_off()
+    figure.suptitle(f"{title}: utilisation without a part ({whole} with all; bold: beyond the cap)")
+    figure.colorbar(colours, ax=grid, label="utilisation [1]", extend="both", shrink=0.9)
+    write_picture(figure, path)
 
 
 def _hand(axes: Axes, losses: list[Loss], colours: ScalarMappable) -> None:
@@ -66,9 +65,16 @@ def _hand(axes: Axes, losses: list[Loss], colours: ScalarMappable) -> None:
         colour = colours.to_rgba(np.array([used]))[0]
         axes.fill([x, x + 1, x + 1, x], [y, y, y + 1, y + 1], color=colour, ec="white", lw=2.0)
         weight = "normal" if loss.holds else "bold"
-        axes.text(x + 0.5, y + 0.5, _number(loss), ha="center", va="center", weight=weight)
+        style: dict[str, Any] = {
+            "ha": "center",
+            "va": "center",
+            "weight": weight,
+            "color": ink_on(colour),
+        }
+        axes.text(x + 0.5, y + 0.5, _number(loss), **style)
     axes.set(xlim=(0, len(GRID_COLUMNS)), ylim=(len(FINGERS), 0))
-    axes.set_xticks([x + 0.5 for x in range(len(GRID_COLUMNS))], GRID_COLUMNS, fontsize=8)
+    names = [name.replace(" ", "\n") for name in GRID_COLUMNS]
+    axes.set_xticks([x + 0.5 for x in range(len(GRID_COLUMNS))], names, fontsize=8)
     axes.set_yticks([y + 0.5 for y in range(len(FINGERS))], FINGERS, fontsize=8)
     axes.tick_params(length=0)
     for side in axes.spines.values():

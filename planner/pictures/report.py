@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from msgspec import structs
 
-from hand_models.base import Array, whole_file
+from hand_models.base import COLOUR_OF, Array, whole_file, write_picture
 from planner.pictures.climb_plots import draw_climb, draw_support
 from planner.result import SPREAD_SETTINGS, LimitName, Plan
 from planner.route import Climb, OutOfReach, RouteResult, RouteStage
@@ -24,9 +24,9 @@ __all__ = ["draw_route", "summary", "write_report"]
 
 PHASE_COLOURS: Final = {
     "start": "0.4",
-    "shift": "tab:purple",
-    "lift": "tab:orange",
-    "place": "tab:blue",
+    "shift": COLOUR_OF["purple"],
+    "lift": COLOUR_OF["amber"],
+    "place": COLOUR_OF["blue"],
 }
 
 
@@ -79,8 +79,7 @@ def write_report(
             files["support"] = folder / "support.png"
             pictures["support"] = support
     for name, figure in pictures.items():
-        with whole_file(files[name]) as part:
-            figure.savefig(part, dpi=130, bbox_inches="tight", facecolor="white")
+        write_picture(figure, files[name], 130, bbox_inches="tight")
     text = json.dumps(summary(result, climb, digest), indent=2, ensure_ascii=False)
     with whole_file(files["summary"]) as part:
         part.write_text(text + "\n", encoding="utf-8")
@@ -273,9 +272,9 @@ def draw_route(result: RouteResult) -> Figure:
             [i - 0.5, i + 0.5], np.multiply((0.7, 0.73), height), color="white", linewidth=3.0
         )
     for i in index[np.isnan(used)]:
-        upper.bar(i, height, color="none", edgecolor="tab:red", hatch="//")
+        upper.bar(i, height, color="none", edgecolor=COLOUR_OF["red"], hatch="//")
         upper.text(i, 0.97 * height, result.plans[i].status, bbox=on_white, **in_bar)
-    upper.axhline(cap, color="tab:red", label=f"limit {cap:g}")
+    upper.axhline(cap, color=COLOUR_OF["red"], label=f"limit {cap:g}")
     for phase, colour in PHASE_COLOURS.items():
         if any(stage.phase == phase for stage in result.stages):
             upper.bar(0, 0, color=colour, label=phase)
@@ -303,7 +302,7 @@ def draw_route(result: RouteResult) -> Figure:
     )
     factor = np.array([np.nan if p.load_factor is None else p.load_factor for p in result.plans])
     lower.plot(index, factor, "o-", color="0.2")
-    lower.axhline(1.0, color="tab:red")
+    lower.axhline(1.0, color=COLOUR_OF["red"])
     for i in np.flatnonzero(np.isnan(factor)):
         answer = result.plans[i]
         text = "unbounded" if answer.load_factor_unbounded else "none"

@@ -5,23 +5,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from hand_models.base import COLOUR_OF
+
 __all__ = ["PICTURE_SETTINGS", "PictureSettings"]
 
 
 @dataclass(frozen=True, slots=True)
 class PictureSettings:
-    """Colours, by their matplotlib names, and sizes of pictures."""
+    """Colours and sizes of pictures."""
 
-    held: str = "tab:blue"
-    gravity: str = "tab:red"
+    held: str = COLOUR_OF["blue"]
+    gravity: str = COLOUR_OF["red"]
     asked: str = "black"
     """Colours of feasible sets (``held``), of gravity, and of what the question asks for."""
-    palm: str = "tab:brown"
+    palm: str = COLOUR_OF["purple"]
     limb: str = "#4a6a8a"
-    load: str = "tab:blue"
-    utilisation: tuple[str, ...] = ("#1a9850", "#e6a117", "#d73027")
-    overload: str = "#7b1fa2"
-    """Colours of utilisations, evenly spaced from 0 to 1, and of those above 1."""
+    load: str = COLOUR_OF["blue"]
+    utilisation: tuple[str, ...] = ("#a2dfd2", "#d98330", "#ab1d30")
+    overload: str = "#2b0d54"
+    dark_overload: str = "#d9b3ff"
+    """Colours of utilisations, evenly spaced from 0 to 1, and of those above 1:
+    the more, the darker. ``dark_overload`` takes the place of the last on a dark page."""
     longest_force: float = 32.0
     """Length of the arrow of the largest tile force [mm]."""
     note_padding: float = 1.0

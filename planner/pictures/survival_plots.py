@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.base import whole_file
+from hand_models.base import COLOUR_OF, write_picture
 from planner.result import Survival, SurvivalShare
 from planner.route import RouteSurvival
 
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 __all__ = ["plot_route_survival", "plot_survival"]
 
 DRAWN_SHARES = (
-    ("holds", "tab:blue", "all hands hold, tensions fixed"),
-    ("replanned", "tab:green", "all hands hold, new set-points after each slip"),
+    ("holds", COLOUR_OF["blue"], "all hands hold, tensions fixed"),
+    ("replanned", COLOUR_OF["green"], "all hands hold, new set-points after each slip"),
 )
 """Shares that are drawn, with their colours."""
 
@@ -44,11 +44,14 @@ def plot_survival(
         Picture file; its suffix, PNG, PDF or SVG, is the format.
     title : str
     """
-    figure = Figure(figsize=(17.0, 6.6), layout="constrained")
+    figure = Figure(figsize=(11.5, 5.6), layout="constrained")
     timeline, curves, agreement = figure.subplots(1, 3, width_ratios=(1.25, 1.1, 0.9))
     _draw_cascade(timeline, found)
     _draw_curves(curves, over_load)
     _draw_agreement(agreement, over_load)
+    for axes in (timeline, curves, agreement):
+        axes.title.set_fontsize(9)
+        axes.xaxis.label.set_fontsize(9)
     figure.suptitle(
         f"{title}: when tiles slip\nWeibull modulus {found.moduli}\nstrengths "
         f"{found.strength:g} times those assumed; scatter of holds {found.hold_scatter:g}, of the "
@@ -56,16 +59,16 @@ def plot_survival(
         fontsize=11,
         parse_math=False,
     )
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=120, facecolor="white")
+    write_picture(figure, path, 120)
 
 
 def _draw_cascade(axes: Axes, found: Survival) -> None:
     """Draw which tile slips at each step, and the largest load over strength that is left."""
     names = [" ".join(p for p in (s.limb, s.finger, s.phalanx) if p) for s in found.cascade]
     places = np.arange(len(names))
-    axes.barh(places, [s.load for s in found.cascade], height=0.55, color="tab:red", alpha=0.75,
-              label="the weakest, which slips")  # fmt: skip
+    loads = [s.load for s in found.cascade]
+    style: dict[str, Any] = {"height": 0.55, "color": COLOUR_OF["red"], "alpha": 0.75}
+    axes.barh(places, loads, label="the weakest, which slips", **style)
     left = [(i, s.most) for i, s in enumerate(found.cascade) if s.most is not None]
     if left:
         at, most = zip(*left, strict=True)
@@ -163,7 +166,7 @@ def plot_route_survival(found: RouteSurvival, path: Path) -> None:
         if stage.survival is None:
             axes.axvspan(stage.index - 0.5, stage.index + 0.5, color="0.85", linewidth=0.0)
             axes.text(stage.index, 0.5, stage.status, rotation=90, ha="center", va="center")
-    axes.axvline(found.worst, color="tab:red", linewidth=6.0, alpha=0.15)
+    axes.axvline(found.worst, color=COLOUR_OF["red"], linewidth=6.0, alpha=0.15)
     axes.set_xticks(range(len(names)), names, rotation=60, ha="right", fontsize=8)
     axes.get_xticklabels()[found.worst].set_fontweight("bold")
     axes.set(xlim=(-0.6, len(names) - 0.4), ylim=(-0.02, 1.02), xlabel="move, phase and limb",
@@ -172,8 +175,7 @@ def plot_route_survival(found: RouteSurvival, path: Path) -> None:
     figure.legend(loc="outside lower center", fontsize=8)
     title = f"{found.route}: when tiles slip, stage by stage; worst {names[found.worst]}"
     figure.suptitle(title, fontsize=11, parse_math=False)
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=120, facecolor="white")
+    write_picture(figure, path, 120)
 
 
 def _of_climb(label: str, value: float | None) -> str:

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from hand_models.base import Array, whole_file
+from hand_models.base import COLOUR_OF, SERIES_COLOURS, Array, write_picture
 from service.sweeping.results import Sweep
 from service.sweeping.rows import State, SweepRow
 from service.sweeping.variation import Value, word_of
@@ -23,7 +23,7 @@ from service.sweeping.variation import Value, word_of
 __all__ = ["plot_sweep"]
 
 LINE_STYLES: Final[dict[str, dict[str, Any]]] = {
-    "cap": {"color": "tab:red", "linestyle": "--", "linewidth": 1.0},
+    "cap": {"color": COLOUR_OF["red"], "linestyle": "--", "linewidth": 1.0},
     "stop": {"color": "0.3", "linestyle": ":", "linewidth": 1.2},
     "border": {"colors": "black", "linewidths": 1.8},
 }
@@ -53,10 +53,10 @@ class Look(NamedTuple):
 
 
 STATE_LOOKS: Final[dict[State, Look]] = {
-    "holds": Look("o", "tab:blue", "holds"),
-    "overloaded": Look("s", "tab:red", "overloaded"),
+    "holds": Look("o", COLOUR_OF["blue"], "holds"),
+    "overloaded": Look("s", COLOUR_OF["red"], "overloaded"),
     "infeasible": Look("x", "0.35", "infeasible: nothing balances the body", "0.75", "////"),
-    "error": Look("+", "tab:orange", "no answer: see the column error", "white", "xx"),
+    "error": Look("+", COLOUR_OF["purple"], "no answer: see the column error", "white", "xx"),
 }
 """Style of each state, from the best state to the worst."""
 
@@ -103,8 +103,7 @@ def plot_sweep(sweep: Sweep, path: Path, title: str, over: Sequence[str] | None 
     holding = sum(row.holds for row in sweep.rows)
     lines = f"{title}: {holding} of {len(sweep.rows)} points hold", figure.get_suptitle()
     figure.suptitle("\n".join(filter(None, lines)), fontsize=11, parse_math=False)
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=120, facecolor="white")
+    write_picture(figure, path, 120)
 
 
 class Side:
@@ -213,7 +212,7 @@ def _plots(sweep: Sweep, panels: Sequence[tuple[int, str]], series: Sequence[int
         side = Side(sweep, place)
         for k, value in enumerate(values):
             rows = [row for row in sweep.rows if not series or row.point[series[0]] == value]
-            colour = f"C{k}" if series else None
+            colour = SERIES_COLOURS[k % len(SERIES_COLOURS)] if series else None
             _draw_curve(axes, _columns(rows, side), name, colour, curves and not side.words)
         for limit in (1.0,) if name == "load factor" else caps if len(caps) == 1 else ():
             axes.axhline(limit, **LINE_STYLES["cap"])
@@ -225,8 +224,8 @@ def _plots(sweep: Sweep, panels: Sequence[tuple[int, str]], series: Sequence[int
         side.label_axis(axes.xaxis)
         if curves:
             axes.label_outer()
-    lines = zip(itertools.count(), values if series else (), strict=False)
-    handles = [Line2D([], [], color=f"C{k}", label=word_of(value)) for k, value in lines]
+    lines = zip(itertools.cycle(SERIES_COLOURS), values if series else (), strict=False)
+    handles = [Line2D([], [], color=colour, label=word_of(value)) for colour, value in lines]
     handles += _markers(sweep.rows, "0.3" if series else None)
     if len(caps) == 1:
         handles.append(
@@ -243,7 +242,7 @@ def _draw_curve(axes: Any, drawn: Columns, name: str, colour: str | None, line: 
     """Draw one number over x, each point as its state; those without a utilisation at the top."""
     order = np.argsort(drawn["x"], kind="stable")
     if line:
-        axes.plot(drawn["x"][order], drawn[name][order], color=colour or "C0")
+        axes.plot(drawn["x"][order], drawn[name][order], color=colour or COLOUR_OF["blue"])
     for state, look in STATE_LOOKS.items():
         there = drawn["state"] == state
         # in axes, for points without a utilisation

@@ -1,0 +1,61 @@
+"""Still pictures: how their files are written, and the colours of what they compare."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from hand_models.base.files import whole_file
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["COLOUR_OF", "SERIES_COLOURS", "write_picture"]
+
+COLOUR_OF: Final = {
+    "blue": "#11366f",
+    "purple": "#8548a6",
+    "red": "#d64a1a",
+    "green": "#1fa583",
+    "sky": "#86c5f2",
+    "amber": "#fbd95c",
+}
+"""Colours of pictures, from dark to light.
+
+Each two differ for the colour-blind, too, and as greys where a page is printed or copied without
+colours (``tests/hand_models/base/test_pictures.py`` says by how much).
+"""
+
+SERIES_COLOURS: Final = tuple(
+    COLOUR_OF[name] for name in ("blue", "red", "green", "sky", "purple", "amber")
+)
+"""Colours of curves beside each other, the first of them the farthest apart."""
+
+TEXT_STAYS_TEXT: Final = {"pdf.fonttype": 42, "svg.fonttype": "none"}
+"""Settings of matplotlib: PDF embeds the fonts as TrueType, which journals ask for, and SVG has
+text that can be searched and edited."""
+
+
+def write_picture(figure: Figure, path: Path, dpi: float = 150.0, **options: Any) -> None:
+    """Write a figure to a file, whole or not at all.
+
+    Parameters
+    ----------
+    figure : Figure
+    path : Path
+        Its suffix, PNG, PDF or SVG, is the format.
+    dpi : float, optional
+        Pixels in an inch of PNG.
+    **options
+        Of matplotlib's ``savefig``.
+
+    Raises
+    ------
+    OSError
+        If writing fails; the error names ``path``.
+    """
+    from matplotlib import rc_context
+
+    with whole_file(path) as part, rc_context(TEXT_STAYS_TEXT):
+        kind = path.suffix[1:].lower()
+        figure.savefig(part, format=kind, dpi=dpi, facecolor="white", **options)
