@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import sys
 import tomllib
+from html import escape
 from pathlib import Path
 from typing import Any
 
-from docutils.nodes import SkipNode, document, image
+from docutils.nodes import SkipNode, document, image, raw
 from latex2mathml.converter import convert as latex_to_mathml
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
-from generation import write_all  # noqa: E402 - found by the line above
+from generation import TURNED, write_all  # noqa: E402 - found by the line above
 
 project = "crux"
 author = "The crux authors"
@@ -33,9 +34,9 @@ html_math_renderer = "mathml"
 smartquotes = False  # which would make a dash of --hand
 html_theme = "furo"
 html_title = f"crux {release}"
-html_static_path = ["style"]
+html_static_path = ["style", "reference/generated/turned"]
 html_css_files = ["crux.css"]
-exclude_patterns = ["reference/generated/bytes"]
+exclude_patterns = ["reference/generated/bytes", "reference/generated/turned"]
 
 myst_heading_anchors = 3
 default_role = "py:obj"
@@ -69,10 +70,29 @@ def link_pictures(app: Any, page: document) -> None:
         picture["width"] = "100%"
 
 
+TURN_IT = """<details class="turned"><summary>Turn it</summary>
+<iframe src="{0}" title="{1}" loading="lazy"></iframe>
+<p><a href="{0}">Open it alone</a></p></details>"""
+"""HTML below a picture of which there is a page that can be turned; it is loaded once opened."""
+
+
+def add_turned(app: Any, page: document, name: str) -> None:
+    """Add, below still pictures, the pages of the same figures that can be turned."""
+    for picture in list(page.findall(image)):
+        turned = TURNED.get(Path(picture["uri"]).stem)
+        if turned and app.builder.format == "html":
+            address = f"{'../' * name.count('/')}_static/{turned.name}"
+            words = escape(picture.get("alt", ""))
+            node = raw("", TURN_IT.format(address, words), format="html")
+            link: Any = picture.parent
+            link.parent.insert(link.parent.index(link) + 1, node)
+
+
 def setup(app: Any) -> None:
-    """Take part in what autodoc does, link pictures and write formulas."""
+    """Take part in what autodoc does, link and turn pictures, write formulas."""
     app.connect("autodoc-skip-member", skip_alias)
     app.connect("doctree-read", link_pictures)
+    app.connect("doctree-resolved", add_turned)
     app.add_html_math_renderer("mathml", (inline_formula, None), (display_formula, None))
 
 

@@ -31,10 +31,6 @@ SERIES_COLOURS: Final = tuple(
 )
 """Colours of curves beside each other, the first of them the farthest apart."""
 
-TEXT_STAYS_TEXT: Final = {"pdf.fonttype": 42, "svg.fonttype": "none"}
-"""Settings of matplotlib: PDF embeds the fonts as TrueType, which journals ask for, and SVG has
-text that can be searched and edited."""
-
 
 def write_picture(figure: Figure, path: Path, dpi: float = 150.0, **options: Any) -> None:
     """Write a figure to a file, whole or not at all.
@@ -56,6 +52,7 @@ def write_picture(figure: Figure, path: Path, dpi: float = 150.0, **options: Any
     """
     from matplotlib import rc_context
 
-    with whole_file(path) as part, rc_context(TEXT_STAYS_TEXT):
+    # fonts embedded as TrueType, which journals ask for; text that can be searched and edited
+    with whole_file(path) as part, rc_context({"pdf.fonttype": 42, "svg.fonttype": "none"}):
         kind = path.suffix[1:].lower()
         figure.savefig(part, format=kind, dpi=dpi, facecolor="white", **options)
