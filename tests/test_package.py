@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import tarfile
 import zipfile
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -21,6 +23,16 @@ def run(*command: str | Path, cwd: Path) -> str:
     return done.stdout
 
 
+def kept_files() -> set[str]:
+    """Files of the packages: modules, stubs, stances, parameters, pages, messages of ROS."""
+    return {
+        file.relative_to(ROOT).as_posix()
+        for package in PACKAGES
+        for file in (ROOT / package).rglob("*")
+        if file.is_file() and "__pycache__" not in file.parts
+    }
+
+
 @pytest.mark.slow
 def test_a_plan_is_made_with_an_installed_wheel_alone(tmp_path: Path) -> None:
     """With the same libraries as here; the packages are those of the wheel."""
@@ -30,13 +42,7 @@ def test_a_plan_is_made_with_an_installed_wheel_alone(tmp_path: Path) -> None:
     run(*pip, "wheel", "--no-deps", "-w", tmp_path, ROOT, cwd=tmp_path)
     (wheel,) = tmp_path.glob("crux_climb-*.whl")
     inside = set(zipfile.ZipFile(wheel).namelist())
-    files = {
-        file.relative_to(ROOT).as_posix()
-        for package in PACKAGES
-        for file in (ROOT / package).rglob("*")
-        if file.is_file() and "__pycache__" not in file.parts
-    }
-    assert files <= inside
+    assert kept_files() <= inside
 
     run(sys.executable, "-m", "venv", "--without-pip", "own", cwd=tmp_path)
     python = tmp_path / "own" / "bin" / "python"
@@ -51,3 +57,26 @@ def test_a_plan_is_made_with_an_installed_wheel_alone(tmp_path: Path) -> None:
     answer = json.loads(run(python.with_name("crux"), "plan", "wall-300", "--json", cwd=tmp_path))
     assert answer["status"] == "optimal"
     assert answer["verified"]
+    schema = json.loads(run(python.with_name("crux"), "schema", cwd=tmp_path))
+    assert schema["$defs"]
+    assert "OPTIMAL" in run(python.with_name("crux"), "demo", "-o", "demo.pdf", cwd=tmp_path)
+    assert (tmp_path / "demo.pdf").read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    not (find_spec("build") and find_spec("twine")), reason="the extra `release` is not installed"
+)
+def test_the_sdist_has_all_and_is_described_as_an_index_wants_it(tmp_path: Path) -> None:
+    run(sys.executable, "-m", "build", "-o", tmp_path, ROOT, cwd=tmp_path)
+    (sdist,), (wheel,) = tmp_path.glob("*.tar.gz"), tmp_path.glob("*.whl")
+    with tarfile.open(sdist) as packed:
+        names = {name.partition("/")[2] for name in packed.getnames()}
+    assert kept_files() <= names
+    assert {"README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md", "pyproject.toml"} <= names
+    assert {"docs/gallery.md", "examples/first_climb.ipynb", "tests/test_package.py"} <= names
+    assert not any(name.startswith((".venv", "build/", "docs/reference/gen")) for name in names)
+    # built from the sdist, as twine and an index read both
+    assert kept_files() <= set(zipfile.ZipFile(wheel).namelist())
+    told = run(sys.executable, "-m", "twine", "check", "--strict", sdist, wheel, cwd=tmp_path)
+    assert told.count("PASSED") == 2
