@@ -77,13 +77,13 @@ def print_replay(replay: Replay, out: Console) -> None:
 
 
 def _ordered(replay: Replay) -> list[Moved]:
-    """Return what has moved, in most answers first."""
-    return sorted(replay.fields.values(), key=lambda each: (-each.answers, each.kind, each.field))
+    """Return what has moved, by most first."""
+    return sorted(replay.fields.values(), key=lambda each: -each.most.size)
 
 
 def _value(value: Any) -> str:
-    """Return a value as text, not too long; numbers with all digits."""
-    said, longest = value if isinstance(value, str) else repr(value), 40
+    """Return a value as text, not too long."""
+    said, longest = f"{value:.5g}" if isinstance(value, float) else str(value), 18
     return said if len(said) <= longest else f"{said[:longest]}…"
 
 
@@ -92,11 +92,9 @@ def _size(moved: Moved) -> str | None:
 
 
 MOVED_COLUMNS = (
-    name("answer", "kind"),
-    text("field", "field"),
+    text("answer: field", lambda each: f"{each.kind}: {each.field}"),
     number("in", "answers", ",d"),
     number("by", _size),
-    text("old", lambda each: _value(each.most.old)),
-    text("new", lambda each: _value(each.most.new)),
+    name("old → new", lambda each: f"{_value(each.most.old)} → {_value(each.most.new)}"),
     number("question", "number", ",d"),
 )
