@@ -87,12 +87,17 @@ def _value(value: Any) -> str:
     return said if len(said) <= longest else f"{said[:longest]}…"
 
 
+def _words(field: str) -> str:
+    """Return a path as words, so that a narrow column can part it."""
+    return field.replace("[]", "").replace(".", " ")
+
+
 def _size(moved: Moved) -> str | None:
     return None if math.isinf(moved.most.size) else f"{moved.most.size:.1e}"
 
 
 MOVED_COLUMNS = (
-    text("answer: field", lambda each: f"{each.kind}: {each.field}"),
+    text("answer: field", lambda each: f"{each.kind}: {_words(each.field)}"),
     number("in", "answers", ",d"),
     number("by", _size),
     name("old → new", lambda each: f"{_value(each.most.old)} → {_value(each.most.new)}"),

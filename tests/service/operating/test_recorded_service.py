@@ -189,7 +189,8 @@ def test_a_replay_is_equal_and_says_what_has_moved(killed, service, tmp_path, ca
     found = json.loads(out)
     assert (found["whole"], found["moved"], found["left_out"]) == (False, 0, 0)
     assert found["equal"] + found["within_gap"] == 26
-    assert found["within_gap"] <= 10
+    # of the set-points, those that are interpolated by when a thread was ready
+    assert found["within_gap"] <= 20
     hand = tmp_path / "hand.toml"
     hand.write_text("[motor]\nmaximum_torque = 0.02\n")
     arguments = ["replay", str(service.file), "--hand", str(hand)]
