@@ -239,8 +239,8 @@ class Finding(Struct, frozen=True):
 
     @property
     def doubts_number(self) -> bool:
-        """True if a number is likely not what is meant: in another unit or frame."""
-        return self.kind in ("unit", "wrench_not_up")
+        """True if a number is likely not what is meant: in another unit or frame, or rounded."""
+        return self.kind in ("unit", "wrench_not_up", "out_of_reach", "nearly_pinching")
 
 
 class Distance(Struct, frozen=True):

@@ -17,7 +17,7 @@ from rich.console import Console
 from service import answering
 from service.answering import dispatch
 from service.commands.cli import COMMANDS_BY_NAME, run_command_line
-from service.commands.stances import bundled
+from service.commands.stances import bundled, read_with_text
 from service.requests import PlanRequest
 from service.tables import print_plan
 from service.wire import decode_request
@@ -533,3 +533,13 @@ def test_help_lists_the_commands_and_bundled_stances(capfd):
     for name in COMMANDS_BY_NAME:
         assert f"  {name} " in out
     assert all(name in out for name in bundled())
+
+
+def test_quiet_still_says_that_a_turn_is_nearly_half(tmp_path, capfd):
+    request = json.loads(read_with_text("wall-300")[1].text)
+    for hand in request["stance"]["hands"]:
+        hand["grasp"] = {"outer_rotation": 3.14}
+    path = tmp_path / "rounded.json"
+    path.write_text(json.dumps(request))
+    run_command_line(["plan", str(path), "-q"])
+    assert "less than in a pinch: is it pi (3.142)?" in capfd.readouterr().err
