@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import hmac
 import secrets
+import socket
 import sys
+import threading
 from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from http.client import HTTP_PORT
@@ -52,7 +55,8 @@ class LiveServer(ThreadingHTTPServer):
     """Server of one live page at 127.0.0.1, whose address has a secret token.
 
     It answers only requests with the token that name this machine as their host, as those of a
-    page of another site do not; questions have to come from the page itself.
+    page of another site do not; questions have to come from the page itself. Each connection has
+    a thread; beyond `ViewingSettings.most_connections` others are refused with status 503.
 
     Parameters
     ----------
@@ -84,6 +88,7 @@ class LiveServer(ThreadingHTTPServer):
         self.address = f"http://127.0.0.1:{self.server_port}/?token={self.token}"
         self.follows = streams is not None
         self._plan, self._streams = plan, streams
+        self._free = threading.BoundedSemaphore(VIEWING_SETTINGS.most_connections)
         self.answers: Mapping[str, Callable[[_Question], Any]] = {
             "/plan": lambda asked: plan.plan(asked.moves, brief=asked.brief),
             "/advice": lambda asked: plan.advice(asked.moves),
@@ -100,6 +105,28 @@ class LiveServer(ThreadingHTTPServer):
             raise InvalidInputError("no stream is followed; start crux view with --follow")
         return self._streams.after(asked.count, VIEWING_SETTINGS.longest_wait)
 
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Answer a connection in a thread of its own, or refuse it where there are too many."""
+        if self._free.acquire(blocking=False):
+            super().process_request(request, client_address)
+            return
+        words = b"crux view has too many connections; close other pages, and try again\n"
+        head = "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 1\r\nConnection: close\r\n"
+        head += f"Content-Type: text/plain; charset=utf-8\r\nContent-Length: {len(words)}\r\n\r\n"
+        with contextlib.suppress(OSError):  # who is gone, or does not read
+            request.setblocking(False)
+            request.send(head.encode() + words)
+            request.shutdown(socket.SHUT_WR)
+            request.recv(VIEWING_SETTINGS.most_bytes)  # what is not read would reset the connection
+        self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Answer a connection until it ends."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Say nothing of a browser that is gone; raise what is a fault of this program."""
         if not isinstance(sys.exc_info()[1], OSError):
@@ -111,7 +138,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     server: LiveServer
     protocol_version = "HTTP/1.1"
-    timeout = VIEWING_SETTINGS.socket_timeout
+    timeout = VIEWING_SETTINGS.first_timeout
     disable_nagle_algorithm = True  # the body would wait for the receipt of the head, for 40 ms
 
     def do_GET(self) -> None:
@@ -153,6 +180,7 @@ class _Handler(BaseHTTPRequestHandler):
                 HTTPStatus.FORBIDDEN,
                 "the token is missing or wrong: open the whole address that crux view has printed",
             )
+        self.connection.settimeout(VIEWING_SETTINGS.socket_timeout)
         if not known:
             raise _RefusedError(HTTPStatus.NOT_FOUND, "there is nothing at this address")
 

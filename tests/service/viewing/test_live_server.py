@@ -18,6 +18,7 @@ from service.answering.own_models import BUNDLED_ROBOTS
 from service.commands.stances import read_request, read_with_text
 from service.replies import PublishedReply
 from service.viewing import FollowedStreams, LivePlan, LiveServer, MovableStance
+from service.viewing.settings import VIEWING_SETTINGS
 from service.wire import Format, stream_key
 from tests.suite.helpers.patience import soon
 
@@ -86,6 +87,31 @@ def test_many_connections_at_once_are_kept():
         for _ in range(60):
             address = ("127.0.0.1", server.server_port)
             connected.enter_context(socket.create_connection(address, timeout=5.0))
+
+
+def test_connections_beyond_the_bound_are_refused_and_make_no_thread(monkeypatch):
+    monkeypatch.setattr(viewing.live_server._Handler, "timeout", 600.0)
+    with LiveServer(None, 0) as server, contextlib.ExitStack() as connected:
+        serving_thread = threading.Thread(target=server.serve_forever, daemon=True)
+        serving_thread.start()
+        before = threading.active_count()
+        held = [
+            connected.enter_context(
+                socket.create_connection(("127.0.0.1", server.server_port), timeout=60.0)
+            )
+            for _ in range(VIEWING_SETTINGS.most_connections)
+        ]
+        page = f"/?token={server.token}x"
+        for _ in range(20):
+            status, headers, text = asked(server, "GET", page)
+            assert (status, headers["Retry-After"]) == (503, "1")
+            assert "too many connections" in text
+        assert threading.active_count() <= before + VIEWING_SETTINGS.most_connections
+        # one that ends makes room for another
+        held[0].close()
+        assert soon(lambda: asked(server, "GET", page)[0] == 403)
+        server.shutdown()
+        serving_thread.join()
 
 
 def test_questions_need_the_token_and_the_pages_own_origin(live):
