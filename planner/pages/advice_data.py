@@ -51,7 +51,9 @@ def _difference(plan: Plan, question: Question, advice: Advice) -> dict[str, Any
     try:
         after = changed(plain, advice.changes)
         planned = solving.plan(after)
-        scenes = drawn_scene(plan, question, 2), drawn_scene(planned, after, 2)
+        scenes = [
+            drawn_scene(*each, 2, rock=False) for each in ((plan, question), (planned, after))
+        ]
     except CruxError:
         return {}
     old, new = ({hand.limb: hand for hand in each.hands or ()} for each in (plan, planned))

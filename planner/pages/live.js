@@ -2,8 +2,10 @@
 // A stance that a person moves: handles over the scene, and the plan of where they are ------------
 
 const live = data.live, token = new URLSearchParams(location.search).get("token") ?? "";
-const past = []; // moves to go back to
-let moves = { body: [0, 0, 0], hands: {} }, wanted = null, busy = false, resting, planned = 0, slips = null;
+const past = [], future = []; // moves to go back to, and those that were undone
+let moves = { body: [0, 0, 0, 0, 0, 0], hands: {} }, sound = moves; // the newest that were planned
+let wanted = null, busy = false, resting, planned = 0, slips = null;
+let held = false, released = false, refused = "", dragTurns = false, slow = false;
 
 async function ask(path, question) {
   try {
@@ -29,18 +31,18 @@ function pixelsAlong(place, axis) { // on the screen, for a metre along an axis 
   return [0, 1].map((k) => 1e3 * (to[k] - from[k]));
 }
 
-function screenAxes() { // of W, to the right and upward
+function screenAxes() { // in W: to the right, upward, and away from who looks
   const { eye, center, up } = byId("scene")._fullLayout.scene._scene.getCamera(), list = (v) => [v.x, v.y, v.z];
   const cross = (a, b) => [0, 1, 2].map((k) => a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]);
   const unit = (v) => v.map((c) => c / (Math.hypot(...v) || 1)), ahead = list(center).map((c, k) => c - list(eye)[k]);
   const right = unit(cross(ahead, list(up)));
-  return [right, unit(cross(right, ahead))];
+  return [right, unit(cross(right, ahead)), unit(ahead)];
 }
 
 const isBody = (name) => name === "body";
-const shiftOf = (all, name) => isBody(name) ? all.body : all.hands[name] ?? [0, 0];
+const shiftOf = (all, name) => isBody(name) ? all.body : all.hands[name] ?? [0, 0, 0];
 function withShift(name, shift) {
-  const rounded = shift.map((c) => Math.round(1e4 * c) / 1e4 + 0); // to a tenth of a millimetre
+  const rounded = shift.map((c) => Math.round(1e4 * c) / 1e4 + 0); // to a tenth of a millimetre, and of a milliradian
   return isBody(name) ? { ...moves, body: rounded } : { ...moves, hands: { ...moves.hands, [name]: rounded } };
 }
 
@@ -48,7 +50,23 @@ function dragged(grip, dx, dy) { // the shift that takes a handle so many pixels
   const [[ax, ay], [bx, by]] = grip.along, [n, m, o] = [ax * ax + ay * ay, ax * bx + ay * by, bx * bx + by * by];
   const [p, q] = [ax * dx + ay * dy, bx * dx + by * dy], least = 0.01 * (n + o); // an axis seen from its end hardly moves
   const size = (n + least) * (o + least) - m * m, parts = [((o + least) * p - m * q) / size, ((n + least) * q - m * p) / size];
-  return grip.shift.map((c, k) => c + (isBody(grip.name) ? grip.axes[0][k] * parts[0] + grip.axes[1][k] * parts[1] : parts[k]));
+  const along = isBody(grip.name) ? (k) => grip.axes[0][k] * parts[0] + grip.axes[1][k] * parts[1] : (k) => parts[k];
+  return grip.shift.map((c, k) => c + (k < live.handles[grip.name].axes.length ? along(k) : 0));
+}
+
+function turnedBy(name, shift, turn) { // then by a rotation vector in W, of a hand what of it is about its approach
+  if (!isBody(name)) return [...shift.slice(0, 2), shift[2] + live.handles[name].turns.yaw.reduce((sum, c, k) => sum + c * turn[k], 0)];
+  const quaternion = (v) => { const size = Math.hypot(...v); return [...v.map((c) => size ? c / size * Math.sin(size / 2) : 0), Math.cos(size / 2)]; };
+  const [[a, b, c, d], [x, y, z, w]] = [quaternion(turn), quaternion(shift.slice(3))];
+  const found = [d * x + a * w + b * z - c * y, d * y - a * z + b * w + c * x, d * z + a * y - b * x + c * w], real = d * w - a * x - b * y - c * z;
+  const size = Math.hypot(...found), angle = 2 * Math.atan2(Math.sign(real || 1) * size, Math.abs(real));
+  return [...shift.slice(0, 3), ...found.map((v) => size ? v / size * angle : 0)];
+}
+
+function turned(grip, dx, dy) { // 30° for some 100 pixels; a hand as a wheel whose top the mouse has
+  const [right, up, ahead] = grip.screen, rate = 0.005, { yaw } = live.handles[grip.name].turns;
+  const way = yaw.reduce((sum, c, k) => sum + c * ahead[k], 0) < 0 ? -rate : rate;
+  return turnedBy(grip.name, grip.shift, isBody(grip.name) ? up.map((c, k) => rate * (dx * c + dy * right[k])) : yaw.map((c) => way * dx * c));
 }
 
 function stepped(name, key, length) { // by an arrow key, along the axis that looks most like it
@@ -66,19 +84,29 @@ function say(text, wrong) {
 }
 
 function sayMoves() {
-  const told = (name, shift, frame) => `${words(name)} [${shift.map((c) => fixed(1e3 * c, 1)).join(", ")}] mm ${frame}`;
-  const hands = Object.entries(moves.hands).filter(([, shift]) => shift.some(Boolean));
-  const all = [...(moves.body.some(Boolean) ? [told("body", moves.body, "in W")] : []), ...hands.map(([name, shift]) => told(name, shift, "along its rock"))];
+  const list = (numbers, scale) => numbers.map((c) => fixed(scale * c, 1)).join(", "), degrees = 180 / Math.PI;
+  const all = Object.entries({ body: moves.body, ...moves.hands }).filter(([, shift]) => shift.some(Boolean)).map(([name, shift]) => {
+    const count = live.handles[name].axes.length, [way, turn] = [shift.slice(0, count), shift.slice(count)];
+    const parts = way.some(Boolean) ? [`[${list(way, 1e3)}] mm ${isBody(name) ? "in W" : "along its rock"}`] : [];
+    if (turn.some(Boolean)) parts.push(isBody(name) ? `turned by [${list(turn, degrees)}]° in W` : `turned by ${list(turn, degrees)}° about its approach`);
+    return `${words(name)} ${parts.join(", ")}`;
+  });
   say(all.length ? `moved: ${all.join("; ")}` : "as given");
+}
+
+function record(before) { // for undo
+  past.push(before);
+  future.length = 0;
 }
 
 function change(next, brief = true) {
   moves = next;
   wanted = { moves, brief };
   byId("undo").disabled = !past.length;
+  byId("redo").disabled = !future.length;
   clearTimeout(resting);
   if (brief) resting = setTimeout(() => { wanted = { moves, brief: false }; follow(); }, 300);
-  follow();
+  return follow();
 }
 
 async function follow() { // one question at a time, the newest
@@ -88,24 +116,55 @@ async function follow() { // one question at a time, the newest
     const asked = wanted;
     wanted = null;
     const reply = await ask("/plan", asked);
-    if (reply.error) say(reply.error, true);
-    else { await take(reply.answer, asked.brief); sayMoves(); }
+    refused = reply.error ?? "";
+    if (refused) say(refused, true);
+    else { sound = asked.moves; await take(reply.answer, asked.brief); sayMoves(); }
     document.body.classList.toggle("stale", Boolean(reply.error) || asked.brief);
     document.body.dataset.planned = ++planned; // questions whose answers are drawn
     if (!reply.error && !asked.brief && !wanted && data.stages[0].status !== "optimal") advise(asked.moves);
   }
   busy = false;
+  settle();
+}
+
+function settle() { // where a drag has ended at what cannot be: back to the newest plan
+  if (!refused || held || busy || !released) return;
+  released = false;
+  const why = refused;
+  change(sound, false).then(() => { if (moves === sound && !refused) say(`back to where it can be: ${why}`); });
+}
+
+function keep(surface) { // its numbers themselves, whatever comes in their place
+  surface.corners = numbers(surface.corners, Float32Array);
+  surface.triangles = numbers(surface.triangles, Uint32Array);
+}
+
+const frame = () => new Promise((go) => requestAnimationFrame(() => setTimeout(go)));
+
+function hurry(moving) { // while the mouse moves nobody hovers; and what is slow to draw is drawn coarsely
+  const { glplot } = byId("scene")._fullLayout.scene._scene, sharp = config.plotGlPixelRatio;
+  for (const object of glplot.objects) if (moving) object.drawPick = null; else delete object.drawPick;
+  if (moving) glplot.gl.readPixels = () => {}; // it would wait until all is drawn
+  else delete glplot.gl.readPixels;
+  glplot.pixelRatio = moving && slow ? sharp / 2 : sharp;
 }
 
 async function take({ stage, meshes, handles }, brief) {
+  const rock = (brief ? data.stages[0] : stage).scene.surfaces.filter((s) => s.kind === "rock"); // it stays
   data.meshes.splice(live.kept, Infinity, ...meshes);
   for (const index of unpacked.keys()) if (index >= live.kept) unpacked.delete(index);
   live.handles = handles;
   drawnAdvice = null;
   data.stages[0] = brief ? { ...data.stages[0], advice: null, ...stage } : stage;
+  if (brief) stage.scene.surfaces.push(...rock);
+  else rock.forEach(keep);
+  hurry(brief);
   if (!brief) { widen(); return show(); }
+  const began = performance.now();
   showOutcome(stage);
   await drawScene();
+  await frame();
+  slow ||= performance.now() - began > 60; // [ms], as without a graphics card
 }
 
 function widen() { // the axes, where something has left them
@@ -123,29 +182,38 @@ async function advise(asked) {
 function handleOf(name) {
   const handle = made("button", "", "handle");
   handle.dataset.limb = name;
-  handle.setAttribute("aria-label", `${words(name)}: drag, or arrow keys by 1 mm, with shift by 10 mm`);
+  const keys = isBody(name) ? "keys R, P, Y" : "key Y";
+  handle.setAttribute("aria-label", `${words(name)}: drag, or arrow keys by 1 mm, with shift by 10 mm; turn with ${keys} by 1°, with shift back`);
   handle.title = words(name);
   let grip = null;
   handle.onpointerdown = (event) => {
     if (event.button) return;
-    const { place, axes: own } = live.handles[name], axes = isBody(name) ? screenAxes() : own;
-    grip = { name, axes, along: axes.map((axis) => pixelsAlong(place, axis)), shift: shiftOf(moves, name), before: moves, x: event.clientX, y: event.clientY };
+    const { place, axes: own } = live.handles[name], screen = screenAxes(), axes = isBody(name) ? screen.slice(0, 2) : own;
+    held = true;
+    grip = { name, axes, screen, turns: event.shiftKey || dragTurns, along: axes.map((axis) => pixelsAlong(place, axis)), shift: shiftOf(moves, name), before: moves, x: event.clientX, y: event.clientY };
     handle.setPointerCapture(event.pointerId);
   };
   handle.onpointermove = (event) => {
     if (!grip) return;
     const [dx, dy] = [event.clientX - grip.x, event.clientY - grip.y];
     if (!grip.moved && Math.hypot(dx, dy) < 3) return; // a click chooses alone
-    if (!grip.moved) past.push(grip.before);
+    if (!grip.moved) record(grip.before);
     grip.moved = true;
-    change(withShift(name, dragged(grip, dx, dy)));
+    change(withShift(name, (grip.turns ? turned : dragged)(grip, dx, dy)));
   };
-  handle.onpointerup = handle.onpointercancel = () => { grip = null; };
+  handle.onpointerup = handle.onpointercancel = () => {
+    released = Boolean(grip?.moved);
+    grip = null; held = false;
+    settle();
+  };
   handle.onkeydown = (event) => {
-    if (!event.key.startsWith("Arrow") || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const axis = live.handles[name].turns[{ r: "roll", p: "pitch", y: "yaw" }[event.key.toLowerCase()]], angle = (event.shiftKey ? -1 : 1) * Math.PI / 180;
+    if (!axis && !event.key.startsWith("Arrow")) return;
     event.preventDefault();
-    past.push(moves);
-    change(withShift(name, stepped(name, event.key, event.shiftKey ? 0.01 : 0.001)));
+    record(moves);
+    released = false;
+    change(withShift(name, axis ? turnedBy(name, shiftOf(moves, name), axis.map((c) => angle * c)) : stepped(name, event.key, event.shiftKey ? 0.01 : 0.001)));
   };
   return handle;
 }
@@ -162,9 +230,12 @@ function placeHandles() { // where the camera sees them, at each frame
   }
 }
 
-function undo() {
-  if (past.length) change(past.pop(), false);
+function goTo(from, back) { // of what is kept, to the newest; back: where the present goes
+  if (!from.length) return;
+  back.push(moves);
+  change(from.pop(), false);
 }
+const undo = () => goTo(past, future), redo = () => goTo(future, past);
 
 function lostTiles(scene) { // a cross at each tile that a stream has lost
   const lost = (slips ?? []).flatMap((s) => scene.tiles.filter((t) => t.limb === s.limb && t.finger === s.finger && t.phalanx === s.phalanx));
@@ -195,19 +266,30 @@ function begin() {
   const around = made("div", "", "around"), handles = Object.assign(made("div"), { id: "handles" }), bar = made("div", "", "buttons");
   const button = (text, id, press) => bar.append(Object.assign(made("button", text), { id, onclick: press }));
   button("undo", "undo", undo);
+  button("redo", "redo", redo);
+  const turner = Object.assign(made("button", "drag turns"), { id: "turn", title: "as with the shift key" });
+  turner.setAttribute("aria-pressed", false);
+  turner.onclick = () => { dragTurns = !dragTurns; turner.setAttribute("aria-pressed", dragTurns); };
+  bar.append(turner);
   byId("views").before(bar);
   button("save as stance", "save", async () => {
     const { answer, error } = await ask("/save", { moves });
     say(error ?? `saved: crux plan ${answer}`, error);
   });
-  const said = Object.assign(made("output", "drag a ring, or choose it and press arrow keys"), { id: "said" });
-  bar.append(said);
-  bar.querySelector("#undo").disabled = true;
+  const said = Object.assign(made("output", "drag a ring, with shift to turn it; or choose it, and press arrow keys, or R, P or Y"), { id: "said" });
+  for (const each of bar.querySelectorAll("#undo, #redo")) each.disabled = true;
   byId("scene").before(around);
   around.append(byId("scene"), handles);
+  const pressed = (event) => { if (event.buttons && (held || handles.contains(event.relatedTarget))) event.stopPropagation(); };
+  for (const kind of ["mouseover", "mouseout", "mouseenter", "mouseleave"]) around.addEventListener(kind, pressed, true); // plotly would turn the camera, too
+  around.after(said); // below: what it says must not move the scene under the mouse
+  document.body.classList.add("live");
   for (const name of Object.keys(live.handles)) handles.append(handleOf(name));
   document.addEventListener("keydown", (event) => {
-    if ((event.ctrlKey || event.metaKey) && event.key === "z") { event.preventDefault(); undo(); }
+    const key = event.key.toLowerCase();
+    if (!(event.ctrlKey || event.metaKey) || (key !== "z" && key !== "y")) return;
+    event.preventDefault();
+    (key === "y" || event.shiftKey ? redo : undo)();
   });
   if (live.follows) {
     const place = Object.assign(made("section"), { id: "stream" }), part = (tag, id, kind) => Object.assign(made(tag, "", kind), { id });
@@ -220,6 +302,7 @@ function begin() {
 
 begin();
 start().then(() => {
+  data.stages[0].scene.surfaces.filter((s) => s.kind === "rock").forEach(keep);
   if (data.stages[0].status !== "optimal") advise(moves);
   if (live.follows) followStreams();
 }).catch(unable);

@@ -17,7 +17,8 @@ const fixed = (value, digits) => Number.isFinite(value) ? value.toFixed(digits) 
 
 function bytesOf(text) { return Uint8Array.from(atob(text), (c) => c.charCodeAt(0)); }
 const unpacked = new Map();
-function numbers(index, kind) {
+function numbers(index, kind) { // or numbers themselves
+  if (typeof index !== "number") return index;
   if (!unpacked.has(index)) unpacked.set(index, new kind(bytesOf(data.meshes[index]).buffer));
   return unpacked.get(index);
 }
@@ -51,8 +52,10 @@ function meshOf(surfaces, more) { // many surfaces as one mesh, its text at each
       mesh.i.push(first + triangles[n]); mesh.j.push(first + triangles[n + 1]); mesh.k.push(first + triangles[n + 2]);
     }
   }
-  return mesh;
+  return { ...mesh, ...seen(mesh) };
 }
+
+const seen = ({ x }) => x.length ? {} : { visible: false }; // what is empty costs time, too
 
 function linesOf(lines, more) { // polylines as one trace, with gaps
   const trace = { type: "scatter3d", mode: "lines", x: [], y: [], z: [], hoverinfo: "skip", ...more };
@@ -60,12 +63,12 @@ function linesOf(lines, more) { // polylines as one trace, with gaps
     for (const [x, y, z] of points) { trace.x.push(x); trace.y.push(y); trace.z.push(z); }
     trace.x.push(null); trace.y.push(null); trace.z.push(null);
   }
-  return trace;
+  return { ...trace, ...seen(trace) };
 }
 
 function dotsOf(points, more) {
   const [x, y, z] = [0, 1, 2].map((k) => points.map((p) => p[k]));
-  return { type: "scatter3d", mode: "markers", x, y, z, hoverinfo: "skip", ...more };
+  return { type: "scatter3d", mode: "markers", x, y, z, hoverinfo: "skip", ...more, ...seen({ x }) };
 }
 
 function tilesOf(tiles, visible) {

@@ -55,7 +55,7 @@ def shown_plan(
     meshes : Meshes
         Meshes of the page, to which those of the plan are added.
     brief : bool, optional
-        True to leave out slices, tables and advice, which take most of the time.
+        True to leave out the rock, slices, tables and advice, which take most of the time.
     """
     cap = question.limits.utilisation
     found = {
@@ -65,7 +65,7 @@ def shown_plan(
         "limit": cap,
         "load_factor": plan.load_factor,
         "load_factor_status": plan.load_factor_status,
-        "scene": scene_data(plan, question, meshes),
+        "scene": scene_data(plan, question, meshes, rock=not brief),
         "warnings": list(plan.warnings),
     }
     if brief:

@@ -122,7 +122,9 @@ def rock_stage(rock: Triangles, pose: Pose, meshes: Meshes, **more: Any) -> dict
     return {"name": "", "sentence": "", "scene": scene} | more
 
 
-def scene_data(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]:
+def scene_data(
+    plan: Plan, question: Question, meshes: Meshes, *, rock: bool = True
+) -> dict[str, Any]:
     """Return the scene of a plan, with its tiles, as plain data in W.
 
     Parameters
@@ -133,6 +135,8 @@ def scene_data(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]
         Question that the plan answers.
     meshes : Meshes
         Meshes of the page, to which those of the scene are added.
+    rock : bool, optional
+        False to leave out the rock of the hands.
 
     Returns
     -------
@@ -142,7 +146,8 @@ def scene_data(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]
     """
     stance = question.stance
     links = meshes.links_of(stance.robot)
-    scene = drawn_scene(plan, question, 5, {link.joint for link, _ in links})
+    own_rock = rock and meshes.rock is None
+    scene = drawn_scene(plan, question, 5, {link.joint for link, _ in links}, rock=own_rock)
     seen = view_directions(stance)
     aside = np.cross(seen.ahead, WORLD_UP)
     eyes = {
@@ -155,7 +160,7 @@ def scene_data(plan: Plan, question: Question, meshes: Meshes) -> dict[str, Any]
     surfaces = [
         meshes.of(each, hands[each.name].pose.rotation[:, 2] if each.name else seen.into)
         for each in scene.surfaces
-        if len(each.faces) and (meshes.rock is None or each.kind != "rock")
+        if len(each.faces)
     ]
     for link, surface in links:
         # where the joints are not known, only what none moves

@@ -220,7 +220,12 @@ def view_directions(stance: Stance) -> ViewDirections:
 
 
 def drawn_scene(
-    plan: Plan, question: Question, fineness: int = 10, without: Collection[int] = ()
+    plan: Plan,
+    question: Question,
+    fineness: int = 10,
+    without: Collection[int] = (),
+    *,
+    rock: bool = True,
 ) -> DrawnScene:
     """Return all visible parts of a plan, in W.
 
@@ -234,21 +239,21 @@ def drawn_scene(
         Number of points in half the outline of a capsule's end.
     without : collection of int, optional
         Joints of Pinocchio's model that no capsule is drawn of.
+    rock : bool, optional
+        False to leave out the rock around the hands.
     """
     stance = question.stance
     settled = [settle_hand(hand, stance) for hand in stance.hands]
     surfaces = _body(plan, stance, fineness, without)
+    if rock:
+        surfaces += _rocks(stance.hands, settled)
     lines: list[Line] = []
     dots: list[Dots] = []
-    for hand, known, rock in zip(stance.hands, settled, _rocks(stance.hands, settled), strict=True):
+    for hand, known in zip(stance.hands, settled, strict=True):
         kind, into_world = known.hand, hand.pose.apply
         x, y = np.abs(kind.palm_tiles[:, :2]).max(axis=0) + kind.palm_tile_size / 2.0
         palm = into_world([(x, y, 0.0), (x, -y, 0.0), (-x, -y, 0.0), (-x, y, 0.0)])
-        apart = np.arange(3 * len(rock)).reshape(-1, 3)
-        surfaces += [
-            DrawnSurface("rock", hand.limb, rock.reshape(-1, 3), apart),
-            DrawnSurface("palm", hand.limb, palm, np.array([(0, 1, 2), (0, 2, 3)])),
-        ]
+        surfaces.append(DrawnSurface("palm", hand.limb, palm, np.array([(0, 1, 2), (0, 2, 3)])))
         frames = kind.frames(known.grasp.outer_rotation)
         lines += [
             Line("finger", into_world(frame.joint + finger.chain @ [frame.along, WORLD_UP]))
@@ -310,8 +315,8 @@ def joint_utilisations(plan: Plan, stance: Stance) -> dict[str, Array]:
     return {limb: (robot.chains[limb].coupling != 0.0) @ shares[limb] for limb in robot.limbs}
 
 
-def _rocks(hands: Sequence[HandOnHold], settled: Sequence[SettledHand]) -> list[Array]:
-    """Return the rock of each hand in W; that which several hold, with the first."""
+def _rocks(hands: Sequence[HandOnHold], settled: Sequence[SettledHand]) -> list[DrawnSurface]:
+    """Return the rock of the hands in W; that which several hold, with the first."""
     placed = [hand.pose @ known.seating.pose for hand, known in zip(hands, settled, strict=True)]
 
     def alike(i: int, j: int) -> bool:
@@ -324,11 +329,12 @@ def _rocks(hands: Sequence[HandOnHold], settled: Sequence[SettledHand]) -> list[
     rocks = []
     for i, (hand, known) in enumerate(zip(hands, settled, strict=True)):
         if any(alike(i, j) for j in range(i)):
-            rocks.append(np.zeros((0, 3, 3)))
             continue
         there = [hands[j].pose.position for j in range(len(hands)) if j == i or alike(i, j)]
         patch = rock_patch(known, hand.pose.inverse().apply(np.array(there)))
-        rocks.append(hand.pose.apply(patch.reshape(-1, 3)).reshape(-1, 3, 3))
+        corners = hand.pose.apply(patch.reshape(-1, 3))
+        apart = np.arange(len(corners)).reshape(-1, 3)
+        rocks.append(DrawnSurface("rock", hand.limb, corners, apart))
     return rocks
 
 

@@ -142,7 +142,7 @@ def view_command(
     with tables.waiting(f"planning {stance}", request):
         movable = viewing.MovableStance(own.asked(request), own.robots)
         live = viewing.LivePlan(movable, name, file, given)
-        live.plan(viewing.StanceMoves(), brief=True)  # the first compiles
+        live.prepare()
     with ExitStack() as ends:
         streams = None
         if follow:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import msgspec
 from msgspec import structs
 
 import planner
-from hand_models.base import InvalidInputError, whole_file
+from hand_models.base import CruxError, InvalidInputError, whole_file
 from planner import deadline
 from service import answering, requests
 from service.viewing.moved_stance import MovableStance, StanceMoves
@@ -46,6 +47,19 @@ class LivePlan:
         self._lock, self._stop = threading.Lock(), threading.Event()
         self._page = planner.LivePage(title)
 
+    def prepare(self) -> None:
+        """Plan the stance, and one with a hand that is moved: the first plans compile.
+
+        Raises
+        ------
+        CruxError
+            If the stance is impossible, or cannot be planned in time.
+        """
+        self.plan(StanceMoves(), brief=True)
+        limb = self._stance.request.stance.hands[0].limb
+        with contextlib.suppress(CruxError):
+            self.plan(StanceMoves(hands={limb: (1e-4, 0.0, 0.0)}), brief=True)
+
     def document(self, **live: Any) -> str:
         """Return the page of the stance as it was given, as HTML.
 
@@ -65,7 +79,7 @@ class LivePlan:
         ----------
         moves : StanceMoves
         brief : bool
-            True to leave out proofs, slices of wrench spaces, and tables.
+            True to leave out proofs, slices of wrench spaces, tables, and the rock, which stays.
 
         Raises
         ------

@@ -16,7 +16,6 @@ from hand_models.base import (
     InvalidInputError,
     Name,
     Pose,
-    Position,
     Strict,
 )
 from hand_models.rock import Hold
@@ -26,16 +25,21 @@ from service.viewing.settings import VIEWING_SETTINGS
 __all__ = ["MovableStance", "StanceMoves"]
 
 
-class StanceMoves(Strict, frozen=True):
-    """Shifts of body and hands from where the stance has them.
+BodyMove = tuple[Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, Coordinate]
+HandMove = tuple[Coordinate, Coordinate, Coordinate]
 
-    - ``body``: shift of the body in W [m].
+
+class StanceMoves(Strict, frozen=True):
+    """Moves of body and hands from where the stance has them.
+
+    - ``body``: shift of the body in W [m], then the rotation vector of its turn about its origin,
+      in W [rad].
     - ``hands``: shift of each hand that is moved along x and y of its seat in the stance, which is
-      H for a hand that is seated on its crest [m].
+      H for a hand that is seated on its crest [m], and its turn about its approach [rad].
     """
 
-    body: Position = (0.0, 0.0, 0.0)
-    hands: dict[Name, tuple[Coordinate, Coordinate]] = {}  # noqa: RUF012 - msgspec copies it
+    body: BodyMove = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    hands: dict[Name, HandMove] = {}  # noqa: RUF012 - msgspec copies it
 
 
 class _Seat(NamedTuple):
@@ -82,7 +86,7 @@ class MovableStance:
         self.request, self.robots = request, robots
         stance = answering.question(request, robots).stance
         settled = planner.settle_each(stance.robot.hand, stance.hands)
-        self._seats = {}
+        self._body, self._seats = stance.body, {}
         for hand, each in zip(stance.hands, settled, strict=True):
             if isinstance(each, InvalidInputError):
                 raise each.within(f"stance.hands.{hand.limb}")
@@ -107,21 +111,24 @@ class MovableStance:
         """
         replace, stance = structs.replace, self.request.stance
         hands = {hand.limb: hand for hand in stance.hands}
-        for limb, (x, y) in moves.hands.items():
+        for limb, move in moves.hands.items():
             if limb not in self._seats:
                 known = ", ".join(self._seats)
                 raise InvalidInputError(f"unknown limb {limb!r}; known are {known}", field="hands")
-            if x or y:
-                hands[limb] = self._placed(hands[limb], x, y)
+            if any(move):
+                hands[limb] = self._placed(hands[limb], *move)
         if self.request.stance.hands == [*hands.values()] and not any(moves.body):
             return self.request
-        body = stance.body
-        x, y, z = (np.array(body.position) + moves.body).tolist()
+        turn = Rotation.from_rotvec(moves.body[3:]).as_matrix() @ self._body.rotation
+        there = Pose(self._body.position + moves.body[:3], turn)
+        body = answering.pose_of_request(there)
+        if not any(moves.body[3:]):  # as it was written
+            body = replace(stance.body, position=body.position)
         return replace(
             self.request,
             stance=replace(
                 stance,
-                body=replace(body, position=(x, y, z)),
+                body=body,
                 hands=[*hands.values()],
                 joints=None if stance.joints is None else "solve",
             ),
@@ -138,20 +145,23 @@ class MovableStance:
         Returns
         -------
         dict of str to dict
-            ``place``: its origin in W [m]; ``axes``: unit vectors in W along which it moves.
+            ``place``: its origin in W [m]; ``axes``: unit vectors in W along which it moves;
+            ``turns``: those about which it turns, by name.
         """
         hands = {
             hand.limb: {
                 "place": hand.pose.position.tolist(),
                 "axes": (seat.rock.rotation @ seat.frame.rotation)[:, :2].T.tolist(),
+                "turns": {"yaw": hand.pose.rotation[:, 2].tolist()},
             }
             for hand in stance.hands
             if (seat := self._seats.get(hand.limb))
         }
+        turns = zip(("roll", "pitch", "yaw"), stance.body.rotation.T.tolist(), strict=True)
         body = {"place": stance.body.position.tolist(), "axes": np.eye(3).tolist()}
-        return hands | {"body": body}
+        return hands | {"body": body | {"turns": dict(turns)}}
 
-    def _placed(self, hand: requests.Hand, x: float, y: float) -> requests.Hand:
+    def _placed(self, hand: requests.Hand, x: float, y: float, turn: float) -> requests.Hand:
         """Return a hand of the request elsewhere on its rock, which gets its pose in W."""
         hold, rock, frame = self._seats[hand.limb]
         point, axes = frame.position + frame.rotation[:, :2] @ [x, y], frame.rotation
@@ -167,6 +177,7 @@ class MovableStance:
         if before is not None and after is not None:
             # by the least turn
             axes = Rotation.align_vectors(after, before)[0].as_matrix() @ axes
+        axes = axes @ Rotation.from_rotvec([0.0, 0.0, turn]).as_matrix()
         up, _, approach = (rock.rotation @ axes).T.tolist()
         fields: dict[str, Any] = {"pose": None, "contact_offset": None}
         if hand.place is None:

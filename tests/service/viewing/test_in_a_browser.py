@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 import threading
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import planner
 from service import answering
@@ -52,16 +55,14 @@ def page(tmp_path_factory):
 
 
 def middle(browser, name):
-    script = f"document.querySelector('[data-limb={name}]').getBoundingClientRect().toJSON()"
-    box = browser.run(script)
-    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    return browser.middle(f"[data-limb={name}]")
 
 
-def drag(browser, name, dx, dy, steps=5):
+def drag(browser, name, dx, dy, steps=5, modifiers=0):
     x, y = middle(browser, name)
-    browser.mouse("mousePressed", x, y)
+    browser.mouse("mousePressed", x, y, modifiers=modifiers)
     for n in range(1, steps + 1):
-        browser.mouse("mouseMoved", x + dx * n / steps, y + dy * n / steps)
+        browser.mouse("mouseMoved", x + dx * n / steps, y + dy * n / steps, modifiers=modifiers)
         browser.until("!busy")
     return x, y
 
@@ -96,16 +97,105 @@ def test_a_person_drags_undoes_and_saves(page):
     browser.press("z", 2)
     assert shown(browser) == first
     assert browser.run("byId('undo').disabled")
+    browser.press("z", 2 + 8)
+    assert shown(browser)[:2] == second[:2]
+    browser.run("byId('redo').click()")
+    assert shown(browser)[2] == third[2]
+    assert browser.run("byId('redo').disabled")
+    browser.press("z", 2)
+    browser.press("z", 2)
+    assert shown(browser) == first
     # by a millimetre, along the axis of the hand that looks most like the arrow; shift: by ten
     browser.run("document.querySelector('[data-limb=rear_left]').focus()")
     browser.press("ArrowUp")
     browser.press("ArrowRight", 8)
     # the hand's x is up the wall, and its y to the right of who faces the wall
-    assert shown(browser)[2]["hands"] == {"rear_left": [0.001, 0.01]}
+    assert shown(browser)[2]["hands"] == {"rear_left": [0.001, 0.01, 0]}
     # off the rock there are words, and the last plan stays
-    browser.run("change(withShift('rear_left', [3, 0]))")
+    browser.run("change(withShift('rear_left', [3, 0, 0]))")
     browser.until("byId('said').classList.contains('wrong')")
     assert "there is no rock 3000 mm along x" in browser.run("byId('said').textContent")
+    browser.press("z", 2)
+    shown(browser)
+    assert browser.errors == []
+
+
+def test_body_and_hands_turn_by_mouse_and_keys(page):
+    browser, _ = page
+    browser.run("change({ body: [0, 0, 0, 0, 0, 0], hands: {} })")
+    first = shown(browser)
+    # to the right with shift: about the vertical of the screen, by 0.005 rad a pixel
+    x, y = drag(browser, "body", 20, 0, modifiers=8)
+    browser.mouse("mouseReleased", x + 20, y, modifiers=8)
+    second = shown(browser)
+    up = browser.run("screenAxes()[1]")
+    assert second[2]["body"] == pytest.approx([0, 0, 0, *(0.1 * c for c in up)], abs=1e-4)
+    assert second[0] != first[0]
+    assert "body turned by [" in browser.run("byId('said').textContent")
+    browser.press("z", 2)
+    assert shown(browser) == first
+    # a hand about its approach, as a wheel whose top the mouse has: clockwise for who sees its back
+    browser.run("byId('turn').click()")
+    x, y = drag(browser, "front_left", 20, 0)
+    browser.mouse("mouseReleased", x + 20, y)
+    assert shown(browser)[2]["hands"] == {"front_left": [0, 0, 0.1]}
+    browser.run("byId('turn').click()")
+    browser.press("z", 2)
+    assert shown(browser) == first
+    for name, keys in {"body": "rpy", "rear_left": "yr"}.items():
+        browser.run(f"document.querySelector('[data-limb={name}]').focus()")
+        for key in keys:
+            browser.press(key)
+            shown(browser)
+    browser.press("y", 8)
+    moves = shown(browser)[2]
+    assert moves["hands"] == {"rear_left": [0, 0, 0]}  # r does nothing
+    one = math.radians(1)
+    given = answering.question(read_request("wall-300")).stance.body.rotation
+    turned = Rotation.from_rotvec(moves["body"][3:]).as_matrix() @ given
+    # about its own axes, one after the other
+    steps = [Rotation.from_rotvec(one * axis).as_matrix() for axis in np.eye(3)]
+    np.testing.assert_allclose(turned, given @ steps[0] @ steps[1] @ steps[2], atol=2e-4)
+    assert browser.errors == []
+
+
+def test_a_drag_that_ends_beside_the_rock_goes_back_to_it(page):
+    browser, _ = page
+    browser.run("change({ body: [0, 0, 0, 0, 0, 0], hands: {} })")
+    first = shown(browser)
+    x, y = drag(browser, "front_right", 0, -15, steps=1)
+    browser.until("!busy && data.stages[0].utilisation !== " + repr(first[0]))
+    browser.mouse("mouseMoved", x, y - 600)
+    browser.until("!busy && byId('said').classList.contains('wrong')")
+    assert "there is no rock" in browser.run("byId('said').textContent")
+    browser.mouse("mouseReleased", x, y - 600)
+    moves = shown(browser)[2]
+    assert 0 < moves["hands"]["front_right"][0] < 0.1
+    browser.until("byId('said').textContent.startsWith('back to where it can be: ')")
+    browser.press("z", 2)
+    assert shown(browser) == first
+
+
+def test_a_finger_drags_at_390_pixels(page):
+    browser, _ = page
+    browser.resize(390, 800)
+    browser.send("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=1)
+    browser.run("change({ body: [0, 0, 0, 0, 0, 0], hands: {} })")
+    first = shown(browser)
+    browser.run("byId('scene').scrollIntoView({ block: 'center' })")
+    browser.until("byId('scene')._fullLayout.width < 390")
+    x, y = middle(browser, "body")
+    browser.touch("touchStart", x, y)
+    for n in range(1, 6):
+        browser.touch("touchMove", x + 4 * n, y)
+        browser.until("!busy")
+    browser.touch("touchEnd")
+    second = shown(browser)
+    assert second[1] != first[1]
+    assert middle(browser, "body") == pytest.approx((x + 20, y), abs=3)
+    assert browser.run("scrollX") == 0
+    browser.send("Emulation.setTouchEmulationEnabled", enabled=False)
+    browser.resize(1280, 900)
     browser.press("z", 2)
     shown(browser)
     assert browser.errors == []
@@ -137,7 +227,7 @@ def test_a_stream_is_shown_and_the_page_fits(page):
             break
     assert re.search("utilisation .* N, normal .* N, lateral .* N", browser.run(told))
     # who goes far stays within the axes
-    browser.run("change({ ...moves, body: [-1, 0, 0] })")
+    browser.run("change({ ...moves, body: [-1, 0, 0, 0, 0, 0] })")
     shown(browser)
     low = browser.run("byId('scene')._fullLayout.scene.xaxis.range[0]")
     assert low < -0.45 - 1.0 - 0.2

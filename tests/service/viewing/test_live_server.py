@@ -141,9 +141,9 @@ def test_bodies_are_bounded_and_strict(live):
     for body, words in (
         (b"{", "not valid JSON"),
         (b'{"moves": {"body": [0, 0]}}', "moves.body"),
-        (b'{"moves": {"body": [0, 0, 1e9]}}', "moves.body"),
+        (b'{"moves": {"body": [0, 0, 1e9, 0, 0, 0]}}', "moves.body"),
         (b'{"moves": {"head": 1}}', "head"),
-        (b'{"moves": {"hands": {"tail": [0, 0.1]}}}', "unknown limb 'tail'"),
+        (b'{"moves": {"hands": {"tail": [0, 0.1, 0]}}}', "unknown limb 'tail'"),
     ):
         status, _, text = asked(server, "POST", "/plan", body)
         assert (status, words in json.loads(text)["error"]) == (200, True)
@@ -152,7 +152,10 @@ def test_bodies_are_bounded_and_strict(live):
 
 def test_a_moved_stance_is_planned_and_saved_as_crux_plan_has_it(live):
     server, file = live
-    moves = {"body": [0.0, 0.03, 0.01], "hands": {"front_right": [0.01, 0.02]}}
+    moves = {
+        "body": [0.0, 0.03, 0.01, 0.0, 0.0, 0.02],
+        "hands": {"front_right": [0.01, 0.02, 0.05]},
+    }
     shown = [answer(server, "/plan", moves=moves, brief=b)["answer"] for b in (True, False)]
     name = answer(server, "/save", moves=moves)["answer"]
     assert name == str(file)
@@ -183,8 +186,8 @@ def test_an_impossible_stance_does_not_replace_what_is_saved(live):
     answer(server, "/save", moves={})
     kept = file.read_bytes()
     for moves, field in (
-        ({"body": [0.0, 0.0, 50.0]}, "stance.hands[0].pose.position: "),
-        ({"hands": {"front_left": [5.0, 0.0]}}, "hands.front_left: there is no rock 5000 mm"),
+        ({"body": [0.0, 0.0, 50.0, 0.0, 0.0, 0.0]}, "stance.hands[0].pose.position: "),
+        ({"hands": {"front_left": [5.0, 0.0, 0.0]}}, "hands.front_left: there is no rock 5000 mm"),
     ):
         assert answer(server, "/save", moves=moves)["error"].startswith(field)
         assert file.read_bytes() == kept

@@ -47,6 +47,11 @@ class Browser:
     def __enter__(self):
         return self
 
+    @property
+    def process_id(self):
+        """Of the browser's first process, whose children are the others."""
+        return self._process.pid
+
     def __exit__(self, *_):
         os.close(self._write)
         self._process.terminate()
@@ -105,19 +110,31 @@ class Browser:
         """Wait until an expression is true."""
         assert soon(lambda: self.run(script)), script
 
-    def mouse(self, kind, x, y, *, held=True):
-        """Send a mouse event: mousePressed, mouseMoved or mouseReleased."""
+    def middle(self, selector):
+        """Return the place of an element's middle in the window."""
+        script = f"document.querySelector('{selector}').getBoundingClientRect().toJSON()"
+        box = self.run(script)
+        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def mouse(self, kind, x, y, *, held=True, modifiers=0):
+        """Send a mouse event: mousePressed, mouseMoved or mouseReleased; modifiers as of press."""
         more = {"button": "left" if held else "none", "clickCount": int(kind != "mouseMoved")}
-        buttons = int(held and kind != "mouseReleased")
-        self.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, buttons=buttons, **more)
+        more |= {"buttons": int(held and kind != "mouseReleased"), "modifiers": modifiers}
+        self.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
+
+    def touch(self, kind, *place):
+        """Send an event of a finger on the screen: touchStart, touchMove or touchEnd."""
+        points = [dict(zip("xy", place, strict=True))] if place else []
+        self.send("Input.dispatchTouchEvent", type=kind, touchPoints=points)
 
     def press(self, key, modifiers=0):
         """Press a key of the keyboard: 2 is Ctrl, 8 is shift."""
-        codes = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "z": 90}
+        arrows = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40}
         for kind in ("rawKeyDown", "keyUp"):
             self.send(
                 "Input.dispatchKeyEvent", type=kind, key=key, modifiers=modifiers,
-                windowsVirtualKeyCode=codes[key], code=f"Key{key.upper()}" if key == "z" else key,
+                windowsVirtualKeyCode=arrows.get(key) or ord(key.upper()),
+                code=key if key in arrows else f"Key{key.upper()}",
             )  # fmt: skip
 
     def screenshot(self, file):
