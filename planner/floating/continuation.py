@@ -17,7 +17,7 @@ import numpy as np
 
 from planner import deadline
 from planner.deadline import Budget
-from planner.floating.elastic_search import find_wrists, first_plan, pressing
+from planner.floating.elastic_search import find_wrists, first_plan, most_programs, pressing
 from planner.floating.goals import SETTINGS
 from planner.floating.wrist_iteration import WristSolution
 from planner.prepare import TOLERANCES, HandSets
@@ -76,7 +76,7 @@ def least_use(
         Largest multiple of the body wrench found on the way; None if none was sought, as for a plan
         within its limits.
     """
-    first = SETTINGS.first_programs
+    first = most_programs(hands)
     plan = None if near is None else find_wrists(hands, near.point, budget.part(first))
     if plan is None or not plan.exact:
         near, plan = None, first_plan(hands, 1.0, budget.part(first))
@@ -185,7 +185,7 @@ def _ways(
     for fraction in SETTINGS.small_factors if up else ():
         if deadline.expired():
             return
-        part = budget.part(SETTINGS.first_programs)
+        part = budget.part(most_programs(hands))
         start = first_plan(hands, fraction, part)
         if start.exact:
             way = _way(hands, start, budget)

@@ -7,10 +7,10 @@ lower the merit
 
     u + ρ (‖missing body wrench‖₁ + violations of all hard rows)
 
-of the model itself, u the utilisation. If the step lowers it by less than predicted, a few Newton
-steps first correct the error of the linearisation (Fletcher, Practical Methods of Optimization,
-ch. 12 and 14). At the end the violations at the point are removed; the sets linearised there prove
-that its utilisation is the least, or the result is marked unproven.
+of the model itself, u the utilisation (Fletcher, Practical Methods of Optimization, ch. 12 and 14).
+If a step lowers it by less than predicted, the sets where it ends give further steps. At the end
+the violations at the point are removed; the sets linearised there prove that its utilisation is the
+least, or the result is marked unproven.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,14 +30,20 @@ from planner.floating.wrist_iteration import (
     WristSolution,
     gap,
     made_exact,
-    repaired,
     searching,
     solve_wrists,
 )
 from planner.prepare import HandSets, LinearisationPoint, Sets
-from planner.programs import WRIST_RANGE
+from planner.programs import WRIST_RANGE, Outcome
 
-__all__ = ["find_wrists", "firm_rows", "first_plan", "pressing", "without_hindrance"]
+__all__ = [
+    "find_wrists",
+    "firm_rows",
+    "first_plan",
+    "most_programs",
+    "pressing",
+    "without_hindrance",
+]
 
 
 def first_plan(hands: HandSets, factor: float, budget: Budget) -> WristSolution:
@@ -72,6 +79,17 @@ def first_plan(hands: HandSets, factor: float, budget: Budget) -> WristSolution:
     return min(searches, key=lambda found: found.measure.missing)
 
 
+def most_programs(hands: HandSets) -> int:
+    """Return the largest number of programs for a first plan; steps of relaxed programs are many.
+
+    Parameters
+    ----------
+    hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
+    """
+    return SETTINGS.first_programs if hands.together is None else SETTINGS.first_relaxed
+
+
 def _palms_carry(hands: HandSets, point: LinearisationPoint) -> bool:
     """Return whether the palm of a compliant hand carries load at a point."""
     return any(
@@ -99,7 +117,7 @@ def _starts(hands: HandSets, factor: float, budget: Budget) -> Iterator[Linearis
     if hands.springy:
         # palms on their springs draw the search to where fingers hold little; half of the programs
         # are for the hands as they are
-        part = budget.part(SETTINGS.first_programs // 2)
+        part = budget.part(most_programs(hands) // 2)
         yield find_wrists(hands.without_palms(), rest, part, SETTINGS.rounds_nearby).point
     yield rest
     if hands.springy and hands.together is None:
@@ -179,7 +197,7 @@ def _relaxed(
     """Search for the least utilisation by relaxed programs, at rising prices."""
     point, goal = start, LEAST_USE
     for price in _prices(hands):
-        now, rounds, settled = _descended(hands, goal, point, price, budget, most)
+        now, rounds = _descended(hands, goal, point, price, budget, most)
         found, point = made_exact(hands, goal, now, rounds, budget), now.point
         if found.exact or budget.ended or not now.sets.finite:
             break
@@ -187,16 +205,6 @@ def _relaxed(
             if not _too_cheap(hands, now, budget):
                 break  # no equilibrium near
             point = start  # not from where too low a price has led
-    for _ in range(SETTINGS.restarts):
-        if settled or not found.exact or budget.ended:
-            break
-        # at kinks the trust region collapses: from there with a whole one
-        now, rounds, settled = _descended(hands, goal, found.point, price, budget, most)
-        again = made_exact(hands, goal, now, found.rounds + rounds, budget)
-        gained = found.measure.utilisation - again.measure.utilisation
-        if not again.exact or gained < 1e-3 * found.measure.utilisation:
-            break
-        found = again
     proven = found.exact and gap(goal, found, found.outcome) <= SETTINGS.closeness
     return replace(found, found="least") if proven else found
 
@@ -205,42 +213,30 @@ def _descended(
     hands: HandSets,
     goal: Goal,
     start: LinearisationPoint,
-    price: float,
+    price: _Price,
     budget: Budget,
     most: int,
-) -> tuple[WristSolution, int, bool]:
+) -> tuple[WristSolution, int]:
     """Lower the merit at a price from a start.
 
-    Returns where that ends, the rounds it took, and whether the sets there promise nothing better.
+    Returns where that ends, and the rounds it took.
     """
     within = SETTINGS.relaxed_range
     now = searching(hands, goal, start, within)
-    firm = firm_rows(now.sets)
     merit, rounds, past = _merit(now, price), 0, [math.inf] * 6
-    while rounds < most and not budget.ended:
-        rounds += 1
-        if past[-6] - merit < 1e-3 * merit:  # six rounds for a thousandth: it creeps along a kink
+    for _ in range(most):
+        # six steps for a thousandth: it creeps along a kink
+        if budget.ended or past[-6] - merit < 1e-3 * merit:
             break
         past.append(merit)
-        outcome = programs.elastic(now.sets.data, price, now.point.loads, firm)
-        budget.spend()
+        outcome = _relaxed_step(now, price, budget)
         if not outcome.solved:
             break
         promised = merit - outcome.value
-        if promised < 1e-4:  # of the utilisation: nothing better about the point
-            return now, rounds, True
-        point = replace(now.point, loads=outcome.loads)
-        there = searching(hands, goal, point, within, now.sets)
-        after = _merit(there, price)
-        for _ in range(3):
-            if not there.sets.finite or merit - after >= 0.7 * promised:
-                break
-            restored = repaired(hands, goal, there, within)
-            better = _merit(restored, price)
-            if not better < after:
-                break
-            there, after = restored, better
-        gained, resized = (merit - after) / promised, within
+        if promised < 1e-4 * price.scale:  # nothing better about the point
+            return now, rounds + 1
+        there, after, steps = _followed(hands, goal, now, outcome, price, within, budget)
+        gained, resized, rounds = (merit - after) / promised, within, rounds + steps
         if after < merit - 1e-9:
             now, merit = there, after
             resized = min(2.0 * within, 4.0) if gained > 0.7 else within
@@ -252,14 +248,57 @@ def _descended(
         if resized != within:
             within = resized
             now = searching(hands, goal, now.point, within, error=now.error)
-    return now, rounds, False
+    return now, rounds
 
 
-def _merit(state: WristSolution, price: float) -> float:
+def _followed(
+    hands: HandSets,
+    goal: Goal,
+    start: WristSolution,
+    outcome: Outcome,
+    price: _Price,
+    within: float,
+    budget: Budget,
+) -> tuple[WristSolution, float, int]:
+    """Follow a step, and if it does not keep half of its promise, those of the sets where it ends.
+
+    A step along curved limits raises the merit, however good its direction; the program about its
+    end corrects that, with the limits that bind there (watchdog: Chamberlain, Powell, Lemarechal
+    and Pedersen, Mathematical Programming Study 16, 1982).
+
+    Returns the best point met, its merit, and the number of steps.
+    """
+    merit, now, best, least, steps = _merit(start, price), start, start, math.inf, 0
+    promised = merit - outcome.value
+    for steps in range(1, SETTINGS.followed + 1):
+        point = replace(now.point, loads=outcome.loads)
+        now = searching(hands, goal, point, within, now.sets)
+        if not now.sets.finite:
+            break
+        after = _merit(now, price)
+        if after < least:
+            best, least = now, after
+        if merit - least >= 0.5 * promised or steps == SETTINGS.followed:
+            break
+        outcome = _relaxed_step(now, price, budget)
+        if not outcome.solved or outcome.value > min(merit, least) - 0.1 * promised:
+            break
+    return best, least, steps
+
+
+def _relaxed_step(state: WristSolution, price: _Price, budget: Budget) -> Outcome:
+    """Solve the relaxed program about a point of the search."""
+    sets, loads = state.sets, state.point.loads
+    budget.spend()
+    near = SETTINGS.nearness * price.scale
+    return programs.elastic(sets.data, price.violation, loads, firm_rows(sets), near)
+
+
+def _merit(state: WristSolution, price: _Price) -> float:
     """Return the utilisation, and what is wrong at its price; infinite where rock is lost."""
     if not state.sets.finite:
         return math.inf
-    return state.measure.utilisation + price * _violation(state)
+    return state.measure.utilisation + price.violation * _violation(state)
 
 
 def _violation(state: WristSolution) -> float:
@@ -267,15 +306,22 @@ def _violation(state: WristSolution) -> float:
     return state.measure.missing + state.measure.excess
 
 
-def _prices(hands: HandSets) -> list[float]:
-    """Return the rising prices of violations, all well above what hands use at rest.
+class _Price(NamedTuple):
+    """Price of violations, and the utilisation that a search counts as one unit.
 
-    Where limits are weak, any load costs more utilisation than a low price: a search at that price
-    would rather leave the body without balance.
+    Where limits are weak, any load uses more of them: with both in proportion to what hands use at
+    rest, the search takes the same steps.
     """
-    prices = [SETTINGS.price * rise for rise in SETTINGS.rises]
+
+    violation: float
+    scale: float
+
+
+def _prices(hands: HandSets) -> list[_Price]:
+    """Return the rising prices of violations, all well above what hands use at rest."""
     at_rest = float(programs.used(hands.data, hands.at_rest().loads).max())
-    return [price for price in prices if price >= SETTINGS.beyond_rest * at_rest] or prices[-1:]
+    scale = max(1.0, SETTINGS.beyond_rest * at_rest / SETTINGS.price)
+    return [_Price(scale * SETTINGS.price * rise, scale) for rise in SETTINGS.rises]
 
 
 def _too_cheap(hands: HandSets, state: WristSolution, budget: Budget) -> bool:
@@ -284,9 +330,7 @@ def _too_cheap(hands: HandSets, state: WristSolution, budget: Budget) -> bool:
     Then the price was too low; otherwise the search ended for want of a balance.
     """
     near = searching(hands, LEAST_USE, state.point, SETTINGS.relaxed_range)
-    highest = SETTINGS.price * SETTINGS.rises[-1]
-    outcome = programs.elastic(near.sets.data, highest, near.point.loads, firm_rows(near.sets))
-    budget.spend()
+    outcome = _relaxed_step(near, _prices(hands)[-1], budget)
     if not outcome.solved:
         return False
     there = near.sets.measure(outcome.loads)

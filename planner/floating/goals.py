@@ -33,9 +33,10 @@ class FloatingSettings:
 
     Then the best plan found is returned. Four floating hands take some ten seconds."""
     first_programs: int = 70  # for a search for a first plan, at most
+    first_relaxed: int = 140  # the same of compliant wrists, whose programs are smaller steps
     effort_programs: int = 110  # for the search for least effort, at most
     rounds: int = 40  # from one starting point, at most
-    restarts: int = 4  # of a search for compliant wrists that ends at a kink, at most
+    followed: int = 4  # steps of relaxed programs until one of them lowers the merit, at most
     rounds_nearby: int = 16  # from a plan, or where another search has failed, at most
     first_range: float = 4.0  # about a point, in `TWIST_UNIT`
     closeness: float = 4e-6  # of a point to the best of the sets about it, relative
@@ -58,7 +59,7 @@ class FloatingSettings:
     rises: tuple[float, ...] = (1.0, 10.0, 100.0, 1000.0)
     """Multiples of the price: where balance costs more utilisation than a price, a search at that
     price ends without balance, and the next goes on at a higher one."""
-    beyond_rest: float = 4.0
+    beyond_rest: float = 8.0
     """Least price over what hands use at rest: plans of bundled stances use some ten times that."""
     far_off: float = 0.1
     """Missing wrench and violations, in their units, from which a higher price is tried only if it
@@ -68,6 +69,7 @@ class FloatingSettings:
 
     Steering of an exact penalty: Byrd, Nocedal and Waltz, Optimization Methods and Software 23,
     2008. Promises of less are within the error of a linearised set."""
+    nearness: float = 1e-3  # weight of half the squared step in relaxed programs, in the units of z
     relaxed_range: float = 1.0
     """Half width of the first trust region of relaxed programs, in `TWIST_UNIT`.
 

@@ -282,12 +282,11 @@ def made_exact(
     for _ in range(12):
         if deadline.expired():
             break
-        outcome = goal.solve(now.sets.data)
-        budget.spend()
-        if goal.exact(now.measure, hands) and outcome.solved:
-            value = goal.value(start.measure)
+        if goal.exact(now.measure, hands):
+            outcome, value = goal.solve(now.sets.data), goal.value(start.measure)
+            budget.spend()
             # repairs may cost a thousandth
-            if goal.value(now.measure) - value <= 1e-3 * max(1.0, value):
+            if outcome.solved and goal.value(now.measure) - value <= 1e-3 * max(1.0, value):
                 return replace(now, found="unproven", outcome=outcome, rounds=rounds)
             break
         before, now, rounds = now, repaired(hands, goal, now, SETTINGS.first_range), rounds + 1

@@ -319,10 +319,7 @@ def test_random_starts_within_the_travel_end_alike(name: str) -> None:
     for start in [random_start(hands, rng) for _ in range(20)]:
         found = without_hindrance(hands, find_wrists(hands, start, Budget(320)), Budget(320))
         used.append(found.measure.utilisation if found.exact else np.inf)
-    # some end at kinks some per cent away
-    within = np.array(used) / min(used) - 1.0
-    assert (within <= 0.01).sum() >= {"wall-300": 18, "overhang": 19, "boulders": 6}.get(name, 4)
-    assert (within <= 0.08).sum() >= {"slab": 18, "boulders": 18}.get(name, 19)
+    assert (np.array(used) <= 1.01 * min(used)).sum() >= 19
 
 
 @pytest.mark.slow
