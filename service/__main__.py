@@ -32,3 +32,7 @@ def _open_what_is_closed() -> None:
             # the system opens the first free descriptor, which is this one
             os.open(os.devnull, os.O_RDWR)
             setattr(sys, name, os.fdopen(number, mode))
+
+
+if __name__ == "__main__":
+    main()

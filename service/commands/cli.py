@@ -295,8 +295,3 @@ def crux() -> None:
 
 
 _say_more_or_less(crux)
-
-if __name__ == "__main__":
-    from service.__main__ import main
-
-    main()

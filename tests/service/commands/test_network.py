@@ -108,7 +108,7 @@ def test_zenoh_may_talk_but_not_on_standard_output(stance_file):
         free_endpoint(),
     ]
     asked = subprocess.run(
-        [sys.executable, "-m", "service.commands.cli", *arguments, "--json"],
+        [sys.executable, "-m", "service", *arguments, "--json"],
         capture_output=True,
         cwd=ROOT,
         env=os.environ | {"PYTHONPATH": str(ROOT), "RUST_LOG": "debug"},

@@ -293,7 +293,7 @@ def test_with_a_file_the_summary_is_what_is_printed(batch_file, tmp_path, capfd)
 def test_a_batch_from_standard_input_goes_through_processes_of_its_own():
     lines = b"".join(msgspec.json.encode(wall_request() | {"id": str(i)}) + b"\n" for i in range(5))
     found = subprocess.run(
-        [sys.executable, "-m", "service.commands.cli", "batch", "-", "--workers", "2", "--json"],
+        [sys.executable, "-m", "service", "batch", "-", "--workers", "2", "--json"],
         input=lines,
         capture_output=True,
         cwd=ROOT,

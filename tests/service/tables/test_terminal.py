@@ -19,7 +19,7 @@ from tests.suite.helpers.patience import PATIENCE
 
 def told(width: int | None, *arguments: str) -> str:
     """Standard error of the command, a terminal of this width or a pipe."""
-    command = [sys.executable, "-m", "service.commands.cli", *arguments]
+    command = [sys.executable, "-m", "service", *arguments]
     env = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES")}
     env |= {"PYTHONPATH": str(ROOT), "TERM": "xterm"}
     ours, theirs = os.pipe() if width is None else pty.openpty()

@@ -36,7 +36,7 @@ def complaint(capfd: pytest.CaptureFixture[str]) -> str:
 def process(*arguments: str, given: bytes = b"") -> subprocess.CompletedProcess[bytes]:
     """The command in a process of its own, in the checkout."""
     return subprocess.run(
-        [sys.executable, "-m", "service.commands.cli", *arguments],
+        [sys.executable, "-m", "service", *arguments],
         input=given,
         capture_output=True,
         cwd=ROOT,

@@ -32,7 +32,7 @@ class Served:
         linked = ["-m", "client", "-e"] if routed else ["-m", "peer", "-l"]
         flags = [*linked, endpoint, "--no-multicast-scouting", "--json", *more]
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "service.commands.cli", "serve", *flags],
+            [sys.executable, "-m", "service", "serve", *flags],
             cwd=folder,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
