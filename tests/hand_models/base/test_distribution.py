@@ -20,7 +20,7 @@ TEXTS = [
         for room in ("hand_models", "planner", "service")
         for path in ROOT.glob(f"{room}/**/*.py")
     ),
-    *sorted(ROOT.glob("examples/*")),
+    *sorted(path for path in ROOT.glob("examples/**/*") if path.is_file()),
 ]
 INSTALLED = re.compile(r"pip3? install (?:-\S+ )*(['\"]?[^'\"`\s]+['\"]?)")
 ELSEWHERE = re.compile(r"\binstall\b[^\n]*\b(?:crux|crux-climb)\[")
