@@ -38,7 +38,7 @@ def pictures() -> Iterator[tuple[Path, str]]:
 
 def draw(picture: Path, commands: str) -> None:
     """Run commands in a folder of their own, and keep the picture that they write there."""
-    main = "from service.commands import main; main()"
+    main = "from service.__main__ import main; main()"
     with TemporaryDirectory() as folder:
         prelude = f"""set -e
             crux() {{ "{sys.executable}" -c "{main}" "$@" || [ $? = 3 ]; }}

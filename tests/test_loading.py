@@ -85,7 +85,8 @@ def test_one_plan_loads_what_it_needs() -> None:
 def test_a_process_of_the_service_has_all_of_it_before_the_first_question() -> None:
     code = "from service.processes import answering; answering(None, None)"
     found = loaded(code)
-    assert {"cvxpy", "trimesh", "scipy.optimize", "scipy.spatial", "clarabel", "highspy"} <= found
+    # CVXPY is for what the fast ways leave over: whoever meets that loads it
+    assert {"trimesh", "scipy.optimize", "scipy.spatial", "clarabel", "highspy"} <= found
     compiled = {f"hand_models.rock.compiled_{part}" for part in ("cells", "cuts", "smoothing")}
     assert compiled <= found
 

@@ -51,7 +51,7 @@ def turned_pages() -> dict[str, bytes]:
 
 def _written(command: str) -> str:
     """Return the page that a command of ``crux`` writes."""
-    run = "from service.commands import main; main()"
+    run = "from service.__main__ import main; main()"
     with TemporaryDirectory() as folder:
         done = subprocess.run(
             [sys.executable, "-c", run, *shlex.split(command)],

@@ -52,10 +52,10 @@ function meshOf(surfaces, more) { // many surfaces as one mesh, its text at each
       mesh.i.push(first + triangles[n]); mesh.j.push(first + triangles[n + 1]); mesh.k.push(first + triangles[n + 2]);
     }
   }
-  return { ...mesh, ...seen(mesh) };
+  return { ...mesh, ...unlessEmpty(mesh) };
 }
 
-const seen = ({ x }) => x.length ? {} : { visible: false }; // what is empty costs time, too
+const unlessEmpty = ({ x }) => x.length ? {} : { visible: false }; // what is empty costs time, too
 
 function linesOf(lines, more) { // polylines as one trace, with gaps
   const trace = { type: "scatter3d", mode: "lines", x: [], y: [], z: [], hoverinfo: "skip", ...more };
@@ -63,12 +63,12 @@ function linesOf(lines, more) { // polylines as one trace, with gaps
     for (const [x, y, z] of points) { trace.x.push(x); trace.y.push(y); trace.z.push(z); }
     trace.x.push(null); trace.y.push(null); trace.z.push(null);
   }
-  return { ...trace, ...seen(trace) };
+  return { ...trace, ...unlessEmpty(trace) };
 }
 
 function dotsOf(points, more) {
   const [x, y, z] = [0, 1, 2].map((k) => points.map((p) => p[k]));
-  return { type: "scatter3d", mode: "markers", x, y, z, hoverinfo: "skip", ...more, ...seen({ x }) };
+  return { type: "scatter3d", mode: "markers", x, y, z, hoverinfo: "skip", ...more, ...unlessEmpty({ x }) };
 }
 
 function tilesOf(tiles, visible) {

@@ -383,10 +383,7 @@ def _capsule(start: Array, end: Array, radius: float, count: int) -> Triangles:
 
 
 def _load(plan: Plan, question: Question) -> Arrow:
-    """Return what the hands hold up, at the centre of mass that was planned with.
-
-    It is called a weight where it is the robot's own weight and nothing else.
-    """
+    """Return what the hands hold up, at its centre of mass; a weight if it is the robot's own."""
     stance, load = question.stance, question.load
     robot, turn = stance.robot, stance.body.rotation
     com = robot.com if plan.joints is None else robot.com_at(plan.joints)

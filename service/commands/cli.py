@@ -84,7 +84,7 @@ COMMANDS_BY_NAME: Final = {
     ),
     "replay": Entry(
         "network",
-        "Ask all questions of a recording again, and say what has moved in the answers.",
+        "Ask all questions of a recording again, here, and say what has moved in the answers.",
     ),
     "rock": Entry(
         "rock",

@@ -21,7 +21,7 @@ from service.publishing import PublishedWrench
 from service.recording import Exchange
 from service.serving.monitor import ServiceMonitor
 from service.serving.question import AnyQuery, PendingQuestion
-from service.wire import Answer, BusyError, Format, encode_error
+from service.wire import Answer, BusyError, Format, encode_error, shared_key
 
 __all__ = ["Replies", "ReplySender", "SharedQueue", "reply_to"]
 
@@ -220,7 +220,7 @@ class Replies:
         recorder = self._monitor.recorder
         if recorder is None or isinstance(question.query, PublishedWrench):
             return
-        now, key, encoding = time.perf_counter(), question.key, question.encoding
+        now, key, encoding = time.perf_counter(), shared_key(question.key), question.encoding
         waited = (now if question.begun < 0.0 else question.begun) - question.arrived
         age, client = now - question.arrived, question.client
         recorder.add(Exchange(key, age, encoding, request, answer, client, waited))

@@ -23,6 +23,7 @@ from .keys import (
     ServiceName as ServiceName,
     server_key as server_key,
     service_key as service_key,
+    shared_key as shared_key,
     stream_key as stream_key,
 )
 from .reading import read_reply as read_reply

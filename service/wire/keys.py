@@ -5,7 +5,14 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Final
 
-__all__ = ["DEFAULT_ROBOT", "ServiceName", "server_key", "service_key", "stream_key"]
+__all__ = [
+    "DEFAULT_ROBOT",
+    "ServiceName",
+    "server_key",
+    "service_key",
+    "shared_key",
+    "stream_key",
+]
 
 
 class ServiceName(StrEnum):
@@ -66,6 +73,18 @@ def server_key(robot: str, server: str, *parts: str) -> str:
         token.
     """
     return service_key(robot, "/".join((ServiceName.SERVER, server, *parts)))
+
+
+def shared_key(key: str) -> str:
+    """Return the key of a question that all services of a robot answer, of the key of one of them.
+
+    Parameters
+    ----------
+    key : str
+        Zenoh key of a question; one that is shared already is returned.
+    """
+    _, robot, name, *more = key.split("/")
+    return service_key(robot, more[1]) if name == ServiceName.SERVER and len(more) == 2 else key
 
 
 def stream_key(robot: str, stream: str, *parts: str) -> str:

@@ -27,7 +27,7 @@ def test_the_notebook_goes_from_a_scan_to_a_page(tmp_path: Path, monkeypatch: py
     pytest.importorskip("ipykernel")
     command = tmp_path / "bin" / "crux"
     command.parent.mkdir()
-    run = "from service.commands import main; main()"
+    run = "from service.__main__ import main; main()"
     command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -c "{run}" "$@"\n')
     command.chmod(0o755)
     monkeypatch.setenv("PATH", f"{command.parent}{os.pathsep}{os.environ['PATH']}")

@@ -22,7 +22,7 @@ from service.answering.questions import question
 from service.commands.cli import run_command_line
 from service.requests import PlanRequest, WrenchSpaceRequest
 from service.serving import PlanService, open_session, zenoh_config
-from service.wire import NoServiceError, ServiceError, decode_request, service_key
+from service.wire import NoServiceError, ServiceError, decode_request, server_key, service_key
 from tests.suite.helpers.commands import complaint, result
 from tests.suite.helpers.hands import entry_toml
 from tests.suite.helpers.patience import PATIENCE
@@ -300,7 +300,9 @@ def test_two_robots_are_served_side_by_side(alone: zenoh.Session, file: Path) ->
         assert service.robot == "arms"
         heard = alone.liveliness().get("crux/**", timeout=PATIENCE)
         alive = {str(reply.ok.key_expr) for reply in heard}
-        assert alive == {service_key(robot, "alive") for robot in ("arms", "robosimian")}
+        (zid, robots) = str(alone.info.zid()), ("arms", "robosimian")
+        keys = [(service_key(robot, "alive"), server_key(robot, zid)) for robot in robots]
+        assert alive == {key for each in keys for key in each}
         arms, simian = (
             CruxClient(alone, name, timeout=PATIENCE) for name in ("arms", "robosimian")
         )

@@ -108,10 +108,11 @@ def test_the_oldest_files_go_where_there_is_a_limit(tmp_path, monkeypatch):
         recorder.add(exchange(made, request=msgspec.json.encode({"v": 1, "id": digits})))
         assert soon(lambda: recorder.health().recorded == made)  # noqa: B023
     recorder.close()
-    files = list(tmp_path.iterdir())
+    files = sorted(tmp_path.iterdir(), key=lambda each: int(each.stem.partition("-")[2] or 1))
     assert sum(each.stat().st_size for each in files) <= limit
     assert not path.exists()
-    assert all(recorded(each) for each in files if each.name != f"a-{len(files)}.mcap")
+    # the newest may have been begun only
+    assert all(map(recorded, files[:-1]))
 
 
 def test_what_waits_has_a_bound_and_the_rest_is_counted(tmp_path, monkeypatch):

@@ -380,9 +380,9 @@ def test_a_stream_that_cannot_be_declared_again_raises(serving: str) -> None:
     refusal = ServiceError("invalid", "no such rock", field="stance")
     replies = iter([StreamReply(**FIRST)])
 
-    def declare() -> StreamReply:
+    def declare() -> tuple[StreamReply, str]:
         for reply in replies:
-            return reply
+            return reply, ""
         raise refusal
 
     known = SimpleNamespace(secret=b"", source=lambda: None)
