@@ -121,7 +121,7 @@ COMMANDS_BY_NAME: Final = {
     ),
     "top": Entry(
         "network",
-        "Show what a running service does: clients, queue, workers, streams, times.",
+        "Show what a running service does, until Ctrl-C: clients, queue, workers, streams, times.",
     ),
     "view": Entry(
         "live",

@@ -187,7 +187,9 @@ def orphaned(pid: int, parent: int) -> bool:
 
 
 @forked
-def test_processes_are_forked_from_one_without_threads_that_has_loaded_the_planner():
+def test_processes_are_forked_from_one_without_threads_that_has_loaded_the_planner(monkeypatch):
+    # a test before may have killed the one of this process
+    monkeypatch.setattr(starting, "_fork_server_died", threading.Event())
     with Workers(workshop.forked_from, 2) as workers:
         found = done(workers, [None] * 8)
     servers = {server for _, server, _ in found.values()}

@@ -379,24 +379,21 @@ def test_a_declaration_that_is_refused_raises(serving: str) -> None:
 def test_a_stream_that_cannot_be_declared_again_raises(serving: str) -> None:
     refusal = ServiceError("invalid", "no such rock", field="stance")
     replies = iter([StreamReply(**FIRST)])
-
-    def declare() -> tuple[StreamReply, str]:
-        for reply in replies:
-            return reply, ""
-        raise refusal
-
     known = SimpleNamespace(secret=b"", source=lambda: None)
-    with (
-        zenoh.open(client_config(serving)) as session,
-        PublishedStream(session, ROBOT, declare, Format.MSGPACK, known) as stream,
-    ):
-        # the service has to know of the subscriber
-        next(iter(session.get(service_key(ROBOT, ServiceName.HEALTH))))
-        stream.publish(WRENCH)
-        with pytest.raises(ServiceError, match="no such rock"):
-            stream.receive(PATIENCE)
-        with pytest.raises(ServiceError, match="no such rock"):
-            stream.publish(WRENCH)
+    with zenoh.open(client_config(serving)) as session:
+        (service,) = session.get(service_key(ROBOT, ServiceName.HEALTH))
+
+        def declare() -> tuple[StreamReply, str]:
+            for reply in replies:
+                return reply, str(service.replier_id.zid)
+            raise refusal
+
+        with PublishedStream(session, ROBOT, declare, Format.MSGPACK, known) as stream:
+            with pytest.raises(ServiceError, match="no such rock"):
+                # what is published before the service knows of the subscriber has no answer
+                soon(lambda: stream.publish(WRENCH) < 0)
+            with pytest.raises(ServiceError, match="no such rock"):
+                stream.receive(PATIENCE)
 
 
 def test_a_client_takes_nothing_for_another_ones_wrenches(slow: str, listener: Listener) -> None:
