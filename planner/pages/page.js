@@ -112,7 +112,7 @@ function groupTraces() { // places that were tried: coloured by a value, or all 
     thickness: 8, len: 0.6, tickfont: { color: ink("dim") } });
   return (data.groups ?? []).map((g, n) => dotsOf(g.places, { meta: g.name, visible: shownKinds[g.name], text: g.texts?.map((t) => plain(t).replaceAll("\n", "<br>")),
     hoverinfo: g.texts || g.template ? "all" : "skip", hovertemplate: (g.texts || g.template) && `${g.template ?? "%{text}"}<extra></extra>`,
-    marker: g.values ? { size: 6, color: g.values, cmin: Math.min(0, ...g.values), cmax: Math.max(...g.values) || 1, colorscale: "Viridis", showscale: true, colorbar: colorbar(g.label) }
+    marker: g.values ? { size: 6, line: { color: ink("ink"), width: 1 }, color: g.values, cmin: Math.min(0, ...g.values), cmax: Math.max(...g.values) || 1, colorscale: "Viridis", showscale: true, colorbar: colorbar(g.label) }
       : { size: 3.5, symbol: symbols[n % 6], color: ink(["dim", "finger", "link"][n % 3]) } }));
 }
 
@@ -304,8 +304,12 @@ function listedAdvice(advice) {
 }
 
 function showOutcome(stage) {
-  const parts = Number.isFinite(stage.utilisation) ? [`utilisation ${fixed(stage.utilisation, 2)} of ${stage.limit}`] : [];
-  if (Number.isFinite(stage.load_factor)) parts.push(`load factor ${fixed(stage.load_factor, 2)}`);
+  const within = (name) => { // the interval over samples, if there were any
+    const ends = stage.spread?.[name];
+    return ends ? ` (${[...new Set(ends.map((end) => fixed(end, 2)))].join(" to ")})` : "";
+  };
+  const parts = Number.isFinite(stage.utilisation) ? [`utilisation ${fixed(stage.utilisation, 2)}${within("utilisation")} of ${stage.limit}`] : [];
+  if (Number.isFinite(stage.load_factor)) parts.push(`load factor ${fixed(stage.load_factor, 2)}${within("load_factor")}`);
   else if (stage.load_factor_status === "unbounded") parts.push("load factor unbounded");
   byId("outcome").replaceChildren(made("span", stage.status, `status ${stage.status}`), parts.join(", "));
   byId("sentence").textContent = stage.sentence;
@@ -316,6 +320,7 @@ function showWords(stage) {
   byId("notes").replaceChildren();
   if (stage.advice?.length) listedAdvice(stage.advice);
   else if (stage.advice) listed("Advice", ["no change that was tried helps"]);
+  if (stage.sure?.length) listed("How sure", stage.sure);
   if (stage.warnings?.length) listed("Warnings", stage.warnings);
   byId("tables").replaceChildren(...(stage.tables ?? []).flatMap((table) => {
     const place = made("div", "", "table");

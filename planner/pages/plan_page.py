@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,14 @@ from planner.pages.plan_rows import plan_tables
 from planner.pages.scenes import Meshes, scene_data
 from planner.pages.wrench_slices import wrench_slice
 from planner.question import Question
-from planner.result import HandPlan, Plan
+from planner.result import HandPlan, Plan, Quantiles
 
 __all__ = ["shown_plan", "write_plan_page"]
 
 
-def write_plan_page(plan: Plan, question: Question, path: Path, title: str) -> None:
+def write_plan_page(
+    plan: Plan, question: Question, path: Path, title: str, sure: Sequence[str] = ()
+) -> None:
     """Write a plan as a page for a browser: one file, which loads nothing else.
 
     Parameters
@@ -30,6 +33,8 @@ def write_plan_page(plan: Plan, question: Question, path: Path, title: str) -> N
         File of HTML to write.
     title : str
         Title of the page.
+    sure : sequence of str, optional
+        Sentences that say how sure the plan is.
 
     Raises
     ------
@@ -37,7 +42,7 @@ def write_plan_page(plan: Plan, question: Question, path: Path, title: str) -> N
         If plotly is not installed.
     """
     meshes = Meshes()
-    shown = shown_plan(plan, question, meshes)
+    shown = shown_plan(plan, question, meshes) | {"sure": list(sure)}
     write_document(title, {"stages": [shown], "meshes": meshes.packed, "said": meshes.said}, path)
 
 
@@ -70,11 +75,22 @@ def shown_plan(
     }
     if brief:
         return found
+    spread = plan.spread
     return found | {
+        "spread": spread and {name: _ends(getattr(spread, name)) for name in _SPREAD},
         "slices": [_slice(hand) for hand in plan.hands or ()],
         "tables": [each._asdict() for each in plan_tables(plan, question)],
         "advice": advice_data(plan, question),
     }
+
+
+_SPREAD = ("utilisation", "load_factor")
+"""Numbers of a plan that a spread has quantiles of."""
+
+
+def _ends(quantiles: Quantiles | None) -> list[float] | None:
+    """Return the ends of an interval over samples; None without one."""
+    return None if quantiles is None else [quantiles.low, quantiles.high]
 
 
 def _slice(hand: HandPlan) -> dict[str, Any]:

@@ -79,6 +79,11 @@ def plan_tables(plan: Plan, question: Question) -> list[PageTable]:
         ("What a unit more of a limit takes off the utilisation", "limb,part,limit,price,unit",
          prices),
         ("In the way of a balance", "limb,part,limit,constraint", barriers),
+        (
+            "Samples of what is not known of hand and rock",
+            "tensions,feasible,overloaded,no balance,utilisation from,utilisation to",
+            list(_samples(plan)),
+        ),
     ]  # fmt: skip
     return [PageTable(*table) for table in tables if table[2]]
 
@@ -92,6 +97,17 @@ def _joints(plan: Plan, question: Question) -> Iterator[list[Any]]:
         columns = (each.tolist() for each in (used, plan.joints[limb], torques[limb], limits[limb]))
         for i, numbers in enumerate(zip(*columns, strict=True), 1):
             yield [_said(limb), i, *numbers]
+
+
+def _samples(plan: Plan) -> Iterator[list[Any]]:
+    """Yield how many samples hold, planned anew and with what is done with this plan."""
+    spread = plan.spread
+    if spread is None:
+        return
+    for words, each in spread.answers.items():
+        counts = each.holds, spread.draws - each.holds - each.without, each.without
+        used = each.utilisation
+        yield [words, *counts, *((None, None) if used is None else (used.low, used.high))]
 
 
 def _owned(name: LimitName) -> list[str]:

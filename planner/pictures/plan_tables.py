@@ -208,12 +208,7 @@ def draw_answers(axes: Any, spread: Spread) -> None:
     spread : Spread
         Each of its answers is a bar: feasible, overloaded and without balance.
     """
-    answers = {
-        "planned anew": spread,
-        "tensions\nkept": spread.kept,
-        "balanced by\nfeedback": spread.feedback,
-    }
-    there = {words: each for words, each in answers.items() if each is not None}
+    there = {textwrap.fill(words, 12): each for words, each in spread.answers.items()}
     holds = np.array([each.holds for each in there.values()])
     without = np.array([each.without for each in there.values()])
     parts = {

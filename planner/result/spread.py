@@ -246,6 +246,16 @@ class Spread(Struct, frozen=True):
     kept: SentSpread | None = None
     feedback: SentSpread | None = None
 
+    @property
+    def answers(self) -> dict[str, Spread | SentSpread]:
+        """What can be done about the samples, by name: those of which there are statistics."""
+        every = {
+            "planned anew": self,
+            "tensions kept": self.kept,
+            "balanced by feedback": self.feedback,
+        }
+        return {words: each for words, each in every.items() if each is not None}
+
     @classmethod
     def of(
         cls,

@@ -112,7 +112,11 @@ def plan_command(
             with planner.deadline.within(request.deadline or seconds, started=started):
                 answer = _with_advice(answer, brief)
     if page is not None:
-        tables.write_answer_page(answer, page, "a plan" if stance == "-" else Path(stance).stem)
+        sure = []
+        if isinstance(answer.reply, replies.PlanReply):
+            sure = tables.sure_sentences(answer.reply, bare, parts)
+        title = "a plan" if stance == "-" else Path(stance).stem
+        tables.write_answer_page(answer, page, title, sure)
     written: list[Path] = []
     if advice_folder is not None:
         assert isinstance(answer.reply, replies.PlanReply)  # of a whole request

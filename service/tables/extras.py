@@ -12,6 +12,7 @@ from rich.console import Console
 from planner import (
     Advice,
     OpenLoop,
+    PalmLoadFactors,
     Quantiles,
     RobustLoadFactor,
     RouteSurvival,
@@ -24,12 +25,16 @@ from service.replies import PlanReply
 from service.tables.layout import counted, in_order, print_rows
 
 __all__ = [
+    "load_factor_words",
+    "palm_sentences",
     "print_advice",
     "print_open_loop",
     "print_route_survival",
     "print_spread",
     "print_survival",
     "robust_sentence",
+    "spread_sentences",
+    "sure_sentences",
     "with_interval",
     "words_of",
 ]
@@ -98,12 +103,9 @@ def print_spread(spread: Spread, out: Console) -> None:
     out : Console
         Console to print on.
     """
-    for sentence in (_spread_sentence(spread), _variance_sentence(spread)):
-        if sentence:
-            out.print(sentence)
-    answers = [("planned anew", spread), ("tensions kept", spread.kept)]
-    answers += [("balanced by feedback", spread.feedback)]
-    there = [(words, each) for words, each in answers if each is not None]
+    for sentence in spread_sentences(spread):
+        out.print(sentence)
+    there = spread.answers.items()
     # a column has as many decimals as its narrowest interval with two ends needs
     found = [each.utilisation for _, each in there if each.utilisation is not None]
     digits = max((_digits(each) for each in found if each.high > each.low + 1e-3), default=3)
@@ -120,6 +122,11 @@ def print_spread(spread: Spread, out: Console) -> None:
     if len(rows) > 1:
         heads = ("feasible", "overloaded", "no balance", "utilisation")
         print_rows(rows, in_order([counted(spread.draws, "sample")], heads), out, result=True)
+
+
+def spread_sentences(spread: Spread) -> list[str]:
+    """Return where a stance is feasible, and what the load factor's variance goes with."""
+    return [each for each in (_spread_sentence(spread), _variance_sentence(spread)) if each]
 
 
 def _spread_sentence(spread: Spread) -> str:
@@ -193,6 +200,39 @@ def robust_sentence(robust: RobustLoadFactor) -> str:
         f"load factor, planned anew with each hand up to {1e3 * robust.position:g} mm and "
         f"{1e3 * robust.angle:g} mrad off its place{left}, {robust.draws} samples:\n{said}"
     )
+
+
+def sure_sentences(
+    reply: PlanReply,
+    without_palm: PlanReply | None = None,
+    palm_parts: PalmLoadFactors | None = None,
+) -> list[str]:
+    """Return what says how sure a plan is: spread, load factors without palms, displaced hands."""
+    said = spread_sentences(reply.spread) if isinstance(reply.spread, Spread) else []
+    said += palm_sentences(without_palm, palm_parts)
+    if isinstance(reply.robust, RobustLoadFactor):
+        said.append(robust_sentence(reply.robust))
+    return said
+
+
+def palm_sentences(without_palm: PlanReply | None, palm_parts: PalmLoadFactors | None) -> list[str]:
+    """Return the load factors of plans without the palms, and without a part of their load."""
+    if without_palm is None:
+        return []
+    said = [f"load factor without the palms' shear and pressing: {load_factor_words(without_palm)}"]
+    if palm_parts is not None:
+        shear, pressing = ("none" if each is None else f"{each:.3f}" for each in palm_parts)
+        said += [f"without their shear alone: {shear}; without their pressing alone: {pressing}"]
+    return said
+
+
+def load_factor_words(reply: PlanReply) -> str:
+    """Return the load factor of a plan, or why there is none."""
+    if reply.load_factor_unbounded:
+        return "unbounded"
+    if reply.load_factor is None:
+        return "not found in time" if reply.load_factor_status == "not_finished" else "none"
+    return f"{reply.load_factor:.3f}"
 
 
 def print_open_loop(found: OpenLoop, out: Console) -> None:

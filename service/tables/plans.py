@@ -18,6 +18,8 @@ from service import replies
 from service.tables.body_spaces import print_com_region
 from service.tables.command_line import note_doubts, print_oddities
 from service.tables.extras import (
+    load_factor_words,
+    palm_sentences,
     print_open_loop,
     print_spread,
     print_survival,
@@ -81,15 +83,8 @@ def print_plan(
         out.print(f"{limb} is at ({where}) m, ({turned}) [x, y, z, w]")
     if reply.path is not None:
         out.print(_path_sentence(reply.path))
-    if without_palm is not None:
-        out.print(
-            f"load factor without the palms' shear and pressing: {_load_factor(without_palm)}"
-        )
-        if palm_parts is not None:
-            shear, pressing = ("none" if each is None else f"{each:.3f}" for each in palm_parts)
-            out.print(
-                f"without their shear alone: {shear}; without their pressing alone: {pressing}"
-            )
+    for sentence in palm_sentences(without_palm, palm_parts):
+        out.print(sentence)
     _print_displaced(reply, out)
     if isinstance(reply.clearance, planner.Clearance):
         _print_clearance(reply.clearance, out)
@@ -138,7 +133,7 @@ def _first_line(reply: replies.PlanReply, spread: planner.Spread | None) -> Iter
     if reply.utilisation is not None:
         yield f"utilisation {with_interval(reply.utilisation, used)}"
     if reply.load_factor is None:
-        yield f"load factor {_load_factor(reply)}"
+        yield f"load factor {load_factor_words(reply)}"
     else:
         yield f"load factor {with_interval(reply.load_factor, factor)}"
     if spread is None:
@@ -207,14 +202,6 @@ def _path_sentence(path: planner.TensionPath) -> str:
     there = "no balance" if used is None else f"utilisation {used:.3f}"
     way = "safe" if path.safe else "not safe"
     return f"from the present tensions ({there}): changes up to {path.largest_change:.1f} N, {way}"
-
-
-def _load_factor(reply: replies.PlanReply) -> str:
-    if reply.load_factor_unbounded:
-        return "unbounded"
-    if reply.load_factor is None:
-        return "not found in time" if reply.load_factor_status == "not_finished" else "none"
-    return f"{reply.load_factor:.3f}"
 
 
 def _print_hands(hands: Sequence[replies.HandReply], out: Console) -> None:

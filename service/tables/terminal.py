@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Protocol
@@ -103,7 +103,9 @@ def write_plan_picture(answer: answering.Planned, picture: Path) -> None:
         planner.plot_plan(answer.plan, answer.question, picture)
 
 
-def write_answer_page(answer: answering.Planned, page: Path, title: str) -> None:
+def write_answer_page(
+    answer: answering.Planned, page: Path, title: str, sure: Sequence[str] = ()
+) -> None:
     """Write the stance and the plan of an answer as a page; raise as `write_plan_picture`.
 
     Parameters
@@ -114,9 +116,11 @@ def write_answer_page(answer: answering.Planned, page: Path, title: str) -> None
         File of HTML to write.
     title : str
         Title of the page.
+    sure : sequence of str, optional
+        Sentences that say how sure the plan is.
     """
     with writing(page, "--html"):
-        planner.write_plan_page(answer.plan, answer.question, page, title)
+        planner.write_plan_page(answer.plan, answer.question, page, title, sure)
 
 
 @contextmanager

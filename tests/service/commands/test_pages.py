@@ -1,5 +1,7 @@
 """``--html`` of commands: what is written, and what is refused before any work is done."""
 
+import json
+import re
 from pathlib import Path
 
 import msgspec
@@ -18,6 +20,31 @@ def test_a_plan_is_written_as_a_page_beside_its_reply(
     page = tmp_path / "plan.html"
     assert run_command_line(["plan", "wall-300", "--html", str(page), "--json"]) == DONE
     assert result(capfd)["reason"] in page.read_text("utf-8")
+
+
+@pytest.mark.slow
+def test_a_page_says_how_sure_its_plan_is(capfd: pytest.CaptureFixture[str], tmp_path: Path):
+    page = tmp_path / "plan.html"
+    asked = ["plan", "wall-300", "--spread", "--html", str(page), "--json"]
+    assert run_command_line(asked) == DONE
+    reply = result(capfd)
+    (text,) = re.findall(r'id="data">(.*?)</script>', page.read_text("utf-8"))
+    (stage,) = json.loads(text)["stages"]
+    spread = reply["spread"]
+    for name in ("utilisation", "load_factor"):
+        assert stage["spread"][name] == [spread[name]["low"], spread[name]["high"]]
+    assert stage["sure"][0].startswith("feasible where a tile on this rock holds at least ")
+    bare = f"{reply['load_factor_without_palm']:.3f}"
+    assert f"load factor without the palms' shear and pressing: {bare}" in stage["sure"]
+    table = stage["tables"][-1]
+    assert [row[0] for row in table["rows"]] == [
+        "planned anew",
+        "tensions kept",
+        "balanced by feedback",
+    ]
+    holds = [row[1] for row in table["rows"]]
+    assert holds == [spread["holds"], spread["kept"]["holds"], spread["feedback"]["holds"]]
+    assert all(sum(row[1:4]) == spread["draws"] for row in table["rows"])
 
 
 def test_advice_that_was_asked_for_is_on_the_page(
