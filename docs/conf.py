@@ -36,6 +36,7 @@ html_theme = "furo"
 html_title = f"crux {release}"
 html_static_path = ["style", "reference/generated/turned"]
 html_css_files = ["crux.css"]
+html_show_search_summary = False  # it would fetch pages, which file:// refuses
 exclude_patterns = ["reference/generated/bytes", "reference/generated/turned"]
 
 myst_heading_anchors = 3
