@@ -36,7 +36,7 @@ const pixel = new Uint8Array(4), drawn = () => { // waits for it
 };
 const change0 = change, ask0 = ask, take0 = take;
 change = (next, brief) => {
-  begun.set(next, event?.timeStamp ?? performance.now());
+  if (event) begun.set(next, event.timeStamp); // what is aimed again has none
   return change0(next, brief);
 };
 ask = async (path, question) => {
@@ -49,6 +49,7 @@ take = async (answer, brief) => {
   await take0(answer, brief);
   if (!brief) return;
   drawn();
+  if (!begun.has(asked)) return;
   const now = performance.now();
   spent.draw.push(now - start); spent.whole.push(now - begun.get(asked));
 };

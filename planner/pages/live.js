@@ -5,7 +5,7 @@ const live = data.live, token = new URLSearchParams(location.search).get("token"
 const past = [], future = []; // moves to go back to, and those that were undone
 let moves = { body: [0, 0, 0, 0, 0, 0], hands: {} }, sound = moves; // the newest that were planned
 let wanted = null, busy = false, resting, planned = 0, slips = null;
-let held = false, released = false, refused = "", dragTurns = false, slow = false;
+let held = false, released = false, aim = null, refused = "", dragTurns = false, slow = false;
 
 async function ask(path, question) {
   try {
@@ -52,6 +52,18 @@ function dragged(grip, dx, dy) { // the shift that takes a handle so many pixels
   const size = (n + least) * (o + least) - m * m, parts = [((o + least) * p - m * q) / size, ((n + least) * q - m * p) / size];
   const along = isBody(grip.name) ? (k) => grip.axes[0][k] * parts[0] + grip.axes[1][k] * parts[1] : (k) => parts[k];
   return grip.shift.map((c, k) => c + (k < live.handles[grip.name].axes.length ? along(k) : 0));
+}
+
+function aimed(grip, dx, dy) { // from where the newest plan has the handle: what is curved, or far, would leave the mouse
+  const { place } = live.handles[grip.name], [x, y] = pixelOf(place), along = grip.axes.map((axis) => pixelsAlong(place, axis));
+  return dragged({ ...grip, along, shift: shiftOf(sound, grip.name) }, grip.at[0] + dx - x, grip.at[1] + dy - y);
+}
+
+function aimAgain() { // while the mouse rests with a handle that is beside it
+  if (!aim || wanted || !aim.left) return;
+  aim.left--;
+  const [x, y] = pixelOf(live.handles[aim.name].place);
+  if (Math.hypot(aim.at[0] - x, aim.at[1] - y) > 1) aim.move(); // [pixel]
 }
 
 function turnedBy(name, shift, turn) { // then by a rotation vector in W, of a hand what of it is about its approach
@@ -118,7 +130,7 @@ async function follow() { // one question at a time, the newest
     const reply = await ask("/plan", asked);
     refused = reply.error ?? "";
     if (refused) say(refused, true);
-    else { sound = asked.moves; await take(reply.answer, asked.brief); sayMoves(); }
+    else { sound = asked.moves; await take(reply.answer, asked.brief); sayMoves(); aimAgain(); }
     document.body.classList.toggle("stale", Boolean(reply.error) || asked.brief);
     document.body.dataset.planned = ++planned; // questions whose answers are drawn
     if (!reply.error && !asked.brief && !wanted && data.stages[0].status !== "optimal") advise(asked.moves);
@@ -190,7 +202,7 @@ function handleOf(name) {
     if (event.button) return;
     const { place, axes: own } = live.handles[name], screen = screenAxes(), axes = isBody(name) ? screen.slice(0, 2) : own;
     held = true;
-    grip = { name, axes, screen, turns: event.shiftKey || dragTurns, along: axes.map((axis) => pixelsAlong(place, axis)), shift: shiftOf(moves, name), before: moves, x: event.clientX, y: event.clientY };
+    grip = { name, axes, screen, turns: event.shiftKey || dragTurns, at: pixelOf(place), shift: shiftOf(moves, name), before: moves, x: event.clientX, y: event.clientY };
     handle.setPointerCapture(event.pointerId);
   };
   handle.onpointermove = (event) => {
@@ -199,11 +211,13 @@ function handleOf(name) {
     if (!grip.moved && Math.hypot(dx, dy) < 3) return; // a click chooses alone
     if (!grip.moved) record(grip.before);
     grip.moved = true;
-    change(withShift(name, (grip.turns ? turned : dragged)(grip, dx, dy)));
+    const now = grip, move = () => change(withShift(name, (now.turns ? turned : aimed)(now, dx, dy)));
+    aim = now.turns ? null : { name, move, left: 3, at: [now.at[0] + dx, now.at[1] + dy] };
+    move();
   };
   handle.onpointerup = handle.onpointercancel = () => {
     released = Boolean(grip?.moved);
-    grip = null; held = false;
+    grip = aim = null; held = false;
     settle();
   };
   handle.onkeydown = (event) => {

@@ -77,15 +77,15 @@ def shown_plan(
         return found
     spread = plan.spread
     return found | {
-        "spread": spread and {name: _ends(getattr(spread, name)) for name in _SPREAD},
+        "spread": spread
+        and {
+            "utilisation": _ends(spread.utilisation),
+            "load_factor": _ends(spread.load_factor),
+        },
         "slices": [_slice(hand) for hand in plan.hands or ()],
         "tables": [each._asdict() for each in plan_tables(plan, question)],
         "advice": advice_data(plan, question),
     }
-
-
-_SPREAD = ("utilisation", "load_factor")
-"""Numbers of a plan that a spread has quantiles of."""
 
 
 def _ends(quantiles: Quantiles | None) -> list[float] | None:

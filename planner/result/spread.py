@@ -248,7 +248,7 @@ class Spread(Struct, frozen=True):
 
     @property
     def answers(self) -> dict[str, Spread | SentSpread]:
-        """What can be done about the samples, by name: those of which there are statistics."""
+        """Statistics of each way to meet the samples, by its name."""
         every = {
             "planned anew": self,
             "tensions kept": self.kept,

@@ -159,6 +159,22 @@ def test_body_and_hands_turn_by_mouse_and_keys(page):
     assert browser.errors == []
 
 
+@pytest.mark.parametrize("way", [-25, 25])
+def test_a_hand_that_is_dragged_around_curved_rock_stays_under_the_mouse(page, way):
+    browser, _ = page
+    browser.run("change({ body: [0, 0, 0, 0, 0, 0], hands: {} })")
+    shown(browser)
+    x, y = drag(browser, "front_right", 0, way)
+    browser.until("!busy && !wanted")
+    assert middle(browser, "front_right") == pytest.approx((x, y + way), abs=1.5)
+    # where the rock has turned its palm
+    moved = browser.run("moves.hands.front_right")
+    assert math.hypot(*moved[:2]) > 0.08
+    browser.mouse("mouseReleased", x, y + way)
+    shown(browser)
+    assert browser.errors == []
+
+
 def test_a_drag_that_ends_beside_the_rock_goes_back_to_it(page):
     browser, _ = page
     browser.run("change({ body: [0, 0, 0, 0, 0, 0], hands: {} })")
