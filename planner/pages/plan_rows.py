@@ -56,7 +56,10 @@ def plan_tables(plan: Plan, question: Question) -> list[PageTable]:
                 tiles.append([limb, name, tile.phalanx, tile.contact, *loads])
     proof = plan.certificate
     names = () if proof is None else proof.irreducible or proof.blocking
-    prices = [[*_owned(each), each.price, f"1/({each.unit})"] for each in plan.prices or ()]
+    prices = [
+        [*_owned(each), each.price, f"1/({each.unit})" if "·" in each.unit else f"1/{each.unit}"]
+        for each in plan.prices or ()
+    ]
     barriers = [[*_owned(each), constraint_words(each)] for each in names]
     wrench = "fx [N],fy [N],fz [N],mx [N·m],my [N·m],mz [N·m]"
     tables = [
