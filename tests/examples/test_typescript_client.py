@@ -19,6 +19,7 @@ from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.remote_api import RemoteApi
 from tests.suite.helpers.served import Served, client_config, free_endpoint
+from tests.suite.problems import problem
 
 pytestmark = pytest.mark.slow
 
@@ -151,10 +152,8 @@ def test_an_error_of_the_service_ends_it(project: Path, locator: str, tmp_path: 
 
 
 def test_where_no_plan_is_it_says_why(project: Path, locator: str, tmp_path: Path) -> None:
-    message = json.loads(STANCE.read_text("utf-8"))
-    message["stance"]["hands"] = message["stance"]["hands"][:1]
-    file = tmp_path / "one-hand.json"
-    file.write_text(json.dumps(message), encoding="utf-8")
+    file = tmp_path / "infeasible.json"
+    file.write_text(json.dumps(problem("infeasible/infeasible-4").request), encoding="utf-8")
     done = run(project, locator, file)
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].startswith("infeasible: ")

@@ -120,6 +120,8 @@ class Client:
             for message in self.socket:
                 assert isinstance(message, bytes)
                 self.take(Reader(message))
+        except ConnectionClosed:
+            pass  # without a close frame
         finally:
             for declared in (*self.publishers.values(), *self.subscribers):
                 declared.undeclare()
