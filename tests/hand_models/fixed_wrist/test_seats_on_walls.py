@@ -20,7 +20,7 @@ def pull_offs(found):
     return [each.support[0] for each in found if not isinstance(each, InvalidInputError)]
 
 
-PLACES, SEARCHED = 60, 6
+PLACES, SEARCHED = 40, 6
 """On each wall."""
 
 

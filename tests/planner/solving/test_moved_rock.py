@@ -97,10 +97,10 @@ def test_plans_change_little_where_rock_is_a_little_elsewhere():
     """
     found = [
         each
-        for seed, question, before in optimal_questions(random_stance, range(400, 700))
+        for seed, question, before in optimal_questions(random_stance, range(400, 550))
         for each in changes(question, before, seed, 5e-5, 3e-4)
     ]
-    assert len(found) >= 25 * TIMES
+    assert len(found) >= 12 * TIMES
     change, lost = np.array(found).T
     assert np.median(change) < 0.015
     assert (change > 0.1).mean() < 0.05
