@@ -87,7 +87,7 @@ def _walk(payload: bytes, start: int, at: int, path: str, found: list[Item]) -> 
             form = NUMBERS[payload[at]]
             (value,) = struct.unpack_from(form, payload, at + 1)
         named = {None: "nil", True: "true", False: "false"}
-        words = named[value] if payload[at] in PLAIN else f"{kind} {value:g}"
+        words = named[PLAIN[payload[at]]] if payload[at] in PLAIN else f"{kind} {value:g}"
         found.append(Item(start, end, path, words, value))
     return end
 
