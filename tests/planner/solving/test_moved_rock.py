@@ -112,10 +112,10 @@ def test_plans_on_rough_rock_are_much_the_same_a_little_elsewhere():
     """By 2 % in the median, 19 % at the 95th percentile."""
     found = [
         each
-        for seed, question, before in optimal_questions(rough_stance, range(40))
+        for seed, question, before in optimal_questions(rough_stance, range(24))
         for each in changes(question, before, seed, 2e-4, 2e-3)
     ]
-    assert len(found) >= 15 * TIMES
+    assert len(found) >= 8 * TIMES
     change, _ = np.array(found).T
     assert np.median(change) < 0.05
     assert np.percentile(change, 95) < 0.25
