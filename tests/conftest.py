@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from importlib.util import find_spec
@@ -40,7 +41,22 @@ LONG = (
 )
 """Files whose tests take longest together, which one process each goes through."""
 
+STARTED = time.monotonic()
+
 COLLECT = (sys.executable, "-m", "pytest", "--collect-only", "-q", "-n", "0")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option for machines on which a run has to end in time."""
+    told = "skip the tests that have not begun this many seconds after the start, and say which"
+    parser.addoption("--skip-after", type=float, metavar="SECONDS", help=told)
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip a test for which no time is left."""
+    most = item.config.getoption("--skip-after")
+    if most is not None and time.monotonic() - STARTED > most:
+        pytest.skip(f"no time left after {most:g} s")
 
 
 def pytest_configure(config: pytest.Config) -> None:
