@@ -7,14 +7,12 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.patience import PATIENCE
-from tests.suite.helpers.served import Served, free_endpoint
 
 pytestmark = pytest.mark.slow
 
@@ -38,14 +36,6 @@ def test_a_plan_is_printed_and_drawn(tmp_path: Path):
     assert printed.startswith("optimal: utilisation 0.96")
     assert len(re.findall(r"\d+ N", printed)) >= 16
     assert (tmp_path / "plan.png").read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    server = Served(free_endpoint(), "--workers", "1")
-    yield server.endpoint
-    server.process.kill()
-    server.process.communicate()
 
 
 def test_a_client_reads_set_points_of_a_wrench_that_drifts(endpoint: str, tmp_path: Path):

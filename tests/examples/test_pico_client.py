@@ -6,7 +6,6 @@ import json
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,6 @@ from service.wire import decode_request
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.replies import PLAN
-from tests.suite.helpers.served import Served, free_endpoint
 
 SOURCE = ROOT / "examples" / "pico_client.c"
 FRAGMENTS = 4096
@@ -51,14 +49,6 @@ def request_of(source: str) -> bytes:
 
 
 REQUEST = request_of(SOURCE.read_text("utf-8"))
-
-
-@pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    server = Served(free_endpoint(), "--workers", "1")
-    yield server.endpoint
-    server.process.kill()
-    server.process.communicate()
 
 
 def asked(endpoint: str, request: bytes, timeout: float = PATIENCE) -> list[dict[str, Any]]:

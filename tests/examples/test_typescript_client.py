@@ -18,7 +18,7 @@ from service.wire import decode_request
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.remote_api import RemoteApi
-from tests.suite.helpers.served import Served, client_config, free_endpoint
+from tests.suite.helpers.served import client_config, free_endpoint
 from tests.suite.problems import problem
 
 pytestmark = pytest.mark.slow
@@ -50,14 +50,6 @@ def npm(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         ["npm", *words], cwd=folder, capture_output=True, text=True, check=False, timeout=PATIENCE
     )
-
-
-@pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    server = Served(free_endpoint(), "--workers", "1")
-    yield server.endpoint
-    server.process.kill()
-    server.process.communicate()
 
 
 @contextmanager

@@ -186,10 +186,15 @@ def orphaned(pid: int, parent: int) -> bool:
     return state == "Z" or int(above) != parent
 
 
-@forked
-def test_processes_are_forked_from_one_without_threads_that_has_loaded_the_planner(monkeypatch):
-    # a test before may have killed the one of this process
+@pytest.fixture
+def fork_server(monkeypatch):
+    """One that works: a test before may have killed that of this process, and so may this one."""
     monkeypatch.setattr(starting, "_fork_server_died", threading.Event())
+
+
+@forked
+@pytest.mark.usefixtures("fork_server")
+def test_processes_are_forked_from_one_without_threads_that_has_loaded_the_planner():
     with Workers(workshop.forked_from, 2) as workers:
         found = done(workers, [None] * 8)
     servers = {server for _, server, _ in found.values()}
@@ -202,8 +207,8 @@ def test_processes_are_forked_from_one_without_threads_that_has_loaded_the_plann
 
 
 @forked
-def test_where_what_they_are_forked_from_is_killed_nothing_is_lost(monkeypatch):
-    monkeypatch.setattr(starting, "_fork_server_died", threading.Event())
+@pytest.mark.usefixtures("fork_server")
+def test_where_what_they_are_forked_from_is_killed_nothing_is_lost():
     with Workers(workshop.forked_from, 2) as workers:
         workers.wait()
         server = done(workers, [None])[0][1]
