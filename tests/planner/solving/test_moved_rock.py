@@ -16,7 +16,7 @@ from planner.solving import plan
 from tests.suite.helpers.rocks import random_mesh
 from tests.suite.helpers.stances import ask, on_wall, random_stance
 
-TIMES = 6
+TIMES = 3
 """That the rock of each stance is moved."""
 
 
@@ -97,10 +97,10 @@ def test_plans_change_little_where_rock_is_a_little_elsewhere():
     """
     found = [
         each
-        for seed, question, before in optimal_questions(random_stance, range(400, 550))
+        for seed, question, before in optimal_questions(random_stance, range(400, 700))
         for each in changes(question, before, seed, 5e-5, 3e-4)
     ]
-    assert len(found) >= 12 * TIMES
+    assert len(found) >= 25 * TIMES
     change, lost = np.array(found).T
     assert np.median(change) < 0.015
     assert (change > 0.1).mean() < 0.05
@@ -112,10 +112,10 @@ def test_plans_on_rough_rock_are_much_the_same_a_little_elsewhere():
     """By 2 % in the median, 19 % at the 95th percentile."""
     found = [
         each
-        for seed, question, before in optimal_questions(rough_stance, range(24))
+        for seed, question, before in optimal_questions(rough_stance, range(40))
         for each in changes(question, before, seed, 2e-4, 2e-3)
     ]
-    assert len(found) >= 8 * TIMES
+    assert len(found) >= 15 * TIMES
     change, _ = np.array(found).T
     assert np.median(change) < 0.05
     assert np.percentile(change, 95) < 0.25
