@@ -1,7 +1,8 @@
 """Interpolations that follow a changing wrench: the newest, the previous one, and the next.
 
 When the wrench drifts from the centre of the newest interpolation, a thread solves the plans of the
-next one, about where the wrench is going. All weights change continuously with the wrench:
+next one, about where the wrench is going. Where the wrench comes again, what was found there is
+used again. All weights change continuously with the wrench:
 
 - the weight φ of an interpolation falls from 1 to 0 in its outermost shell;
 - the share τ of a new interpolation grows from 0 to 1 with the distance that the wrench moves after
@@ -12,9 +13,10 @@ from __future__ import annotations
 
 import logging
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -26,6 +28,9 @@ from planner.streaming.stream_stance import StreamStance
 __all__ = ["Mixture", "Prefetch"]
 
 log = logging.getLogger(__name__)
+
+MOST_KEPT: Final = 16
+"""Number of interpolations that are kept for a wrench that comes again, some 10 kB each."""
 
 
 class Mixture(NamedTuple):
@@ -78,6 +83,7 @@ class Prefetch:
         self._fading, self._fade = 1.0, 0.0
         """τ, and the way over which it grows, in radii."""
         self.newest = self._found([stance.first])
+        self._kept = deque([] if self.newest is None else [self.newest], MOST_KEPT)
         self._missed: Array | None = stance.first if self.newest is None else None
         """Wrench at which an interpolation was asked for that is not there."""
 
@@ -125,6 +131,8 @@ class Prefetch:
     def look_ahead(self, wrench: Array, distance: float) -> None:
         """Start solving the next interpolation if the wrench is far from the newest centre.
 
+        One that was found before is next if its centre is near.
+
         Parameters
         ----------
         wrench : ndarray, shape (6,)
@@ -145,7 +153,13 @@ class Prefetch:
                 # ahead by half of the way from the last centre
                 centres.insert(0, wrench + 0.5 * (wrench - self.newest.centre))
         self._missed = wrench
-        self.coming = self._thread.submit(self._found, centres)
+        others = [one for one in self._kept if one is not self.newest and one is not self._before]
+        known = min(others, key=lambda one: one.distance(wrench), default=None)
+        if known is not None and known.distance(wrench) < 0.5:
+            self.coming = Future()
+            self.coming.set_result(known)
+        else:
+            self.coming = self._thread.submit(self._found, centres)
 
     def _take_over(self, coming: Future[Interpolation | None], last: Array) -> None:
         new = None if coming.cancelled() else coming.result()
@@ -163,6 +177,8 @@ class Prefetch:
             return
         self.coming = self._missed = None
         self._before, self.newest = here[0] if here else None, new
+        if new not in self._kept:
+            self._kept.append(new)
         fade = 0.1  # of the radius: the way over which a new one takes over
         # where no other has a weight, plans are solved, and at its centre they are the same
         self._fade = fade if here else min(fade, self._way(last, new.centre))

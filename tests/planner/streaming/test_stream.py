@@ -276,6 +276,31 @@ def test_a_jump_is_solved_and_the_next_interpolation_is_about_it(stream):
     assert complaints(WALL, stream.set_points(there - 0.5)) == []
 
 
+def test_a_wrench_that_comes_again_finds_the_interpolations_of_before(stream, monkeypatch):
+    """A gait repeats: nothing is solved again, and set-points are as continuous."""
+    way = WEIGHT + np.outer(np.linspace(0.0, 3.0 * RADIUS, 121), np.eye(6)[0])
+
+    def followed(wrenches) -> list[Interpolation]:
+        used = []
+        for wrench in wrenches:
+            assert stream.set_points(wrench).verified
+            assert stream.wait(PATIENCE)
+            used.append(stream.newest)
+        return used
+
+    out = followed(way)
+    assert len(set(map(id, out))) >= 4
+    asked, about = [], Interpolation.about
+    monkeypatch.setattr(Interpolation, "about", lambda *at: asked.append(at) or about(*at))
+    back = followed(way[::-1])
+    again = followed(way)
+    assert not asked
+    assert set(map(id, [*back, *again])) <= set(map(id, out))
+    ratios, points = changes(stream, way[::-1])
+    assert ratios.max() < SLOPE
+    assert {each.source for each in points} == {"interpolated"}
+
+
 def test_the_same_wrench_has_the_same_set_points(stream):
     first = stream.set_points(WEIGHT + 1.0)
     assert stream.set_points(list(WEIGHT + 1.0)) is first
