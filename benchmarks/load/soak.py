@@ -131,7 +131,10 @@ def publishing(stream: PublishedStream, stop: threading.Event) -> Callable[[], d
                 counts["answered" if found.error is None else "errors"] += 1
 
     threading.Thread(target=receive, daemon=True).start()
-    return lambda: counts | {"lost": stream.lost, "declared": stream.declarations}
+    return lambda: (
+        counts
+        | {"replaced": stream.replaced, "lost": stream.lost, "declared": stream.declarations}
+    )
 
 
 @click.command()

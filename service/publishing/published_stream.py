@@ -10,6 +10,7 @@ from typing import Any, Protocol, Self
 
 import zenoh
 from msgspec import UNSET
+from msgspec.structs import replace
 from zenoh.handlers import Callback
 
 from hand_models.base import CruxError, InvalidInputError
@@ -65,6 +66,9 @@ class PublishedStream:
     lost : int
         Number of wrenches that have no answer and are not counted as skipped either: lost on the
         way, with the service, or while the stream was declared again.
+    replaced : int
+        Number of answers that newer ones replaced before they were received; the wrenches that they
+        had skipped are counted as skipped by the answer that is received.
     """
 
     def __init__(
@@ -85,7 +89,7 @@ class PublishedStream:
         self._fault: CruxError | None = None
         self._last = -1
         self._away = self._closed = False
-        self.lost = 0
+        self.lost = self.replaced = 0
         self.declarations = 1
         self.declared, self._server = declare()
         self._points = self._subscribed()
@@ -224,6 +228,10 @@ class PublishedStream:
                 if number >= 0:
                     self.lost += max(number - self._last - 1 - reply.skipped, 0)
                     self._last = number
+                unread = self._unread
+                if unread is not None and unread.number is not None:
+                    self.replaced += 1
+                    reply = replace(reply, skipped=reply.skipped + unread.skipped)
                 self._unread = reply
             self._changed.notify_all()
 
