@@ -28,10 +28,11 @@ def check_endpoints(endpoints: Iterable[str], metrics_port: int | None = None) -
     InvalidInputError
         If an address is in use, or is not this machine's.
     """
-    tried = [(endpoint, "--listen") for endpoint in endpoints]
+    listens = "give another with --listen, or as listen/endpoints in the file that says so"
+    tried = [(endpoint, "--listen", listens) for endpoint in endpoints]
     if metrics_port is not None:
-        tried.append((f"tcp/127.0.0.1:{metrics_port}", "--metrics-port"))
-    for endpoint, option in tried:
+        tried.append((f"tcp/127.0.0.1:{metrics_port}", "--metrics-port", "give another"))
+    for endpoint, option, advice in tried:
         protocol, _, rest = endpoint.partition("/")
         host, _, port = rest.partition("?")[0].partition("#")[0].rpartition(":")
         if protocol not in {"tcp", "tls", "quic", "udp"}:
@@ -48,7 +49,7 @@ def check_endpoints(endpoints: Iterable[str], metrics_port: int | None = None) -
                 if stream:
                     probe.listen(1)
         except OSError as error:
-            message = f"{endpoint} cannot be opened: {error.strerror or error}; give another"
+            message = f"{endpoint} cannot be opened: {error.strerror or error}; {advice}"
             raise InvalidInputError(message, field=option) from None
 
 
