@@ -170,15 +170,15 @@ class Dispatcher:
             self._pool.start_worker(climbs=self._waiting.count(Kind.CLIMB))
             self._deal()
         pipes = self._pool.pipes
-        ready = wait([self._inbox.pipe, *pipes], self._pause())
+        ready = wait([self._inbox.bell, *pipes], self._pause())
         for pipe in ready:
             if (
-                pipe is not self._inbox.pipe
+                pipe is not self._inbox.bell
                 # not of a process whose end another lane has reported meanwhile
                 and (lane := pipes[cast(Connection, pipe)]).handle in self._pool.handles
             ):
                 self._take_back(lane)
-        if self._inbox.pipe in ready:
+        if self._inbox.bell in ready:
             if len(ready) > 1 and self._stops_at is None:
                 # no lane waits for what has come
                 self._deal()

@@ -1,11 +1,12 @@
-"""Take events from other threads into one thread, which they wake by a pipe."""
+"""Take events from other threads into one thread, which they wake by a socket."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from multiprocessing import Pipe
+from contextlib import suppress
 from queue import Empty, SimpleQueue
+from socket import socketpair
 
 __all__ = ["Inbox"]
 
@@ -15,14 +16,15 @@ class Inbox:
 
     Attributes
     ----------
-    pipe : Connection
+    bell : socket.socket
         Readable while there may be events.
     """
 
     def __init__(self) -> None:
         self._events: SimpleQueue[Callable[[], None]] = SimpleQueue()
-        self.pipe, self._waker = Pipe(duplex=False)
-        self._bell = threading.Lock()
+        self.bell, self._waker = socketpair()
+        self.bell.setblocking(False)
+        self._ringing = threading.Lock()
         self._rung = False
 
     def post(self, event: Callable[[], None]) -> None:
@@ -36,10 +38,10 @@ class Inbox:
         return self._events.empty()
 
     def take(self) -> Iterator[Callable[[], None]]:
-        """Yield the events that have come, but 32 at most: the rest keeps the pipe readable."""
-        if self.pipe.poll():
-            self.pipe.recv_bytes()
-        with self._bell:
+        """Yield the events that have come, but 32 at most: the rest keeps the bell readable."""
+        with suppress(BlockingIOError):
+            self.bell.recv(1)
+        with self._ringing:
             self._rung = False
         # most events that are taken in before processes are looked at again
         for _ in range(32):
@@ -50,7 +52,7 @@ class Inbox:
         self._ring()
 
     def _ring(self) -> None:
-        with self._bell:
+        with self._ringing:
             if not self._rung:
                 self._rung = True
-                self._waker.send_bytes(b"!")
+                self._waker.send(b"!")

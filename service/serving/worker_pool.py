@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Iterable
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
 from typing import Literal
 
 from planner import Make, PriorityLane, WorkerHandle, resident
@@ -71,6 +71,8 @@ class WorkerPool:
         self.streams = 0
         self._purposes: dict[WorkerHandle[Job, Answer], Purpose] = {}
         self._starting: dict[WorkerHandle[Job, Answer], float] = {}
+        self._reads_memory: dict[WorkerHandle[Job, Answer], float] = {}
+        """When a worker's memory is to be read next."""
 
     @property
     def handles(self) -> list[WorkerHandle[Job, Answer]]:
@@ -181,12 +183,10 @@ class WorkerPool:
 
     def idle(self) -> list[PriorityLane[Job, Answer]]:
         """Return the lanes of ready workers that have no question to answer."""
-        return [
-            lane
-            for lane, asked in self.work.items()
-            # a process that has just died is reported by its pipe next
-            if asked is None and lane.ready and not lane.pipe.poll()
-        ]
+        idle = {lane.pipe: lane for lane, asked in self.work.items() if asked is None}
+        # a process that has just died is reported by its pipe next
+        dead = wait(idle, 0.0)
+        return [lane for pipe, lane in idle.items() if lane.ready and pipe not in dead]
 
     def takes_dear(self) -> bool:
         """Return whether one more question that may take long leaves a worker free for others.
@@ -217,9 +217,14 @@ class WorkerPool:
     def has_grown(self, lane: PriorityLane[Job, Answer]) -> bool:
         """Return whether a lane's worker uses more than 700 MiB of memory, and must be replaced.
 
-        Always false for the worker that keeps the streams.
+        Always false for the worker that keeps the streams. A worker's memory is read at most every
+        0.1 s.
         """
-        size = None if self.has_streams(lane) else resident(lane.handle.process.pid)
+        handle, now = lane.handle, time.perf_counter()
+        if self.has_streams(lane) or now < self._reads_memory.get(handle, 0.0):
+            return False
+        self._reads_memory[handle] = now + 0.1
+        size = resident(handle.process.pid)
         # [bytes] of resident memory
         return size is not None and size > 700 * 2**20
 
@@ -246,6 +251,7 @@ class WorkerPool:
         if self._purposes[handle] == "streams":
             self._keep(())
         self._starting.pop(handle, None)
+        self._reads_memory.pop(handle, None)
         del self._purposes[handle]
         if handle.ready:
             self.failed_starts = 0
