@@ -14,7 +14,9 @@ from service.wire import Answer, Format, encode_error
 from service.wire.errors import BusyError
 from tests.suite.helpers.requests import stream_request, wall_request
 
-PLAN, STREAM, POINTS = (f"crux/robosimian/{name}" for name in ("plan", "stream", "set_points"))
+PLAN, STREAM, POINTS, BODY = (
+    f"crux/robosimian/{name}" for name in ("plan", "stream", "set_points", "body_space")
+)
 WRENCH = [480.0, 0.0, 0.0, 0.0, 0.0, 0.0]
 
 
@@ -56,9 +58,11 @@ def test_answers_of_all_kinds_are_equal_to_the_digit(tmp_path):
         wrench = [WRENCH[0] + step, *WRENCH[1:]]
         points = ask(POINTS, {"v": 1, "stream": stream, "body_wrench": wrench}, Format.MSGPACK)
         assert points["verified"]
+    # its error is a number: how far the space is off
+    assert ask(BODY, wall_request())["error"] == 0.0
     replay = ask.replayed()
-    assert (replay.equal, replay.near, replay.moved, replay.left_out) == (10, 0, 0, 0)
-    assert replay.asked == {"plan": 4, "stream": 1, "set_points": 5}
+    assert (replay.equal, replay.near, replay.moved, replay.left_out) == (11, 0, 0, 0)
+    assert replay.asked == {"plan": 4, "stream": 1, "set_points": 5, "body_space": 1}
     assert replay.fields == {}
 
 
