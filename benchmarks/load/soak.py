@@ -132,8 +132,7 @@ def publishing(stream: PublishedStream, stop: threading.Event) -> Callable[[], d
 
     threading.Thread(target=receive, daemon=True).start()
     return lambda: (
-        counts
-        | {"replaced": stream.replaced, "lost": stream.lost, "declared": stream.declarations}
+        counts | {"replaced": stream.replaced, "lost": stream.lost, "declared": stream.declarations}
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,9 @@ from planner.route import OutOfReach, RouteResult, RouteStage
 __all__ = ["shown_stages", "write_route_page"]
 
 
-def write_route_page(result: RouteResult, path: Path) -> None:
+def write_route_page(
+    result: RouteResult, path: Path, sure: Sequence[Sequence[str]] | None = None
+) -> None:
     """Write the plans of a climb as a page for a browser, with a slider over its stages.
 
     Parameters
@@ -23,6 +26,8 @@ def write_route_page(result: RouteResult, path: Path) -> None:
         Plans of all stages of the climb.
     path : Path
         File of HTML to write.
+    sure : sequence of sequence of str, optional
+        Sentences of each stage that say how sure its plan is.
 
     Raises
     ------
@@ -31,6 +36,8 @@ def write_route_page(result: RouteResult, path: Path) -> None:
     """
     meshes = Meshes()
     stages = shown_stages(result, meshes)
+    if sure is not None:
+        stages = [stage | {"sure": list(said)} for stage, said in zip(stages, sure, strict=True)]
     data = {"stages": stages, "crux": result.crux, "meshes": meshes.packed, "said": meshes.said}
     write_document(result.route.name, data, path)
 

@@ -10,6 +10,7 @@ from .listing import (
     route_listing as route_listing,
 )
 from .naming import naming_options as naming_options, with_options as with_options
+from .pages import write_page as write_page
 from .seeking import seek as seek
 from .sources import Sources as Sources
 from .verdict import (

@@ -274,8 +274,7 @@ def _one(
         with tables.filling_folder():
             files, digest = climbs.write_route(result, climb, folder, asked.stage)
     if page is not None:
-        with tables.writing(page, "--html"):
-            planner.write_route_page(result, page)
+        climbs.write_page(result, page)
         files["page"] = page
     if as_json:
         tables.say(

@@ -16,6 +16,7 @@ from .extras import (
     print_advice as print_advice,
     print_route_survival as print_route_survival,
     print_survival as print_survival,
+    spread_sentences as spread_sentences,
     sure_sentences as sure_sentences,
     words_of as words_of,
 )

@@ -69,6 +69,27 @@ def test_a_page_of_a_route_needs_no_folder(capfd: pytest.CaptureFixture[str], tm
     assert page.read_text("utf-8").count('"sentence":') == found["stages"]
 
 
+@pytest.mark.slow
+def test_the_page_of_a_route_says_what_helps_at_its_crux_and_how_sure_it_is(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path
+):
+    page = tmp_path / "route.html"
+    asked = ["route", "six-moves", "--spread", "--html", str(page), "--json"]
+    assert run_command_line(asked) == OVERLOADED
+    (text,) = re.findall(r'id="data">(.*?)</script>', page.read_text("utf-8"))
+    shown = json.loads(text)
+    stages, crux = shown["stages"], result(capfd)["crux"]["stage"]
+    assert shown["crux"] == crux
+    assert all(stage["sure"] and stage["spread"] for stage in stages)
+    assert [n for n, stage in enumerate(stages) if stage["advice"]] == [crux]
+    assert run_command_line(["route", "six-moves", "--stage", str(crux), "--json"]) == OVERLOADED
+    assert stages[crux]["sentence"] == result(capfd)["reason"]
+    # planned, each of them
+    best = stages[crux]["advice"][0]
+    assert best["holds"]
+    assert best["utilisation"] <= 1.0 < stages[crux]["utilisation"]
+
+
 def test_pages_are_of_one_route_or_rock(capfd: pytest.CaptureFixture[str], tmp_path: Path):
     page = str(tmp_path / "route.html")
     for more in ([], ["--resume"], ["-o", str(tmp_path / "routes.csv")]):
