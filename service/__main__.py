@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import sys
 
+from hand_models.base import use_one_thread
 from service.processes import interruptible
 
 __all__ = ["main"]
@@ -16,6 +17,8 @@ __all__ = ["main"]
 def main() -> None:
     """Run the command line with this process's arguments, and exit with its status."""
     _open_what_is_closed()
+    # as workers do: so answers of both are equal to the digit
+    use_one_thread()
     with interruptible():
         from service.commands import run_command_line
 

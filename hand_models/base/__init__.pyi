@@ -48,6 +48,10 @@ from .message_fields import (
     Strict as Strict,
     Tension as Tension,
 )
+from .one_thread import (
+    THREAD_VARIABLES as THREAD_VARIABLES,
+    use_one_thread as use_one_thread,
+)
 from .orientations import (
     ORIENTATION_FIELDS as ORIENTATION_FIELDS,
     check_orientation_form as check_orientation_form,

@@ -15,6 +15,8 @@ from multiprocessing import resource_tracker
 from types import FrameType
 from typing import Any, Final
 
+from hand_models.base import THREAD_VARIABLES
+
 __all__ = [
     "SETTINGS",
     "ProcessSettings",
@@ -30,12 +32,6 @@ class ProcessSettings:
     """Constants of worker processes and of the process that starts them."""
 
     signals: tuple[signal.Signals, ...] = (signal.SIGINT, signal.SIGTERM)
-    thread_variables: tuple[str, ...] = (
-        "OPENBLAS_NUM_THREADS",
-        "OMP_NUM_THREADS",
-        "MKL_NUM_THREADS",
-    )
-    """Environment variables that limit a linear-algebra library to one thread, when it loads."""
     part_bytes: int = 2**13  # of an answer, sent at once: no process can be stopped within them
     out_of_memory: int = 77  # exit status of one that may not have the memory it needs
     unknown: int = 255  # the same, by `multiprocessing`, of one whose fork server is dead
@@ -133,8 +129,8 @@ def starting_children(*signals: signal.Signals) -> Iterator[None]:
 @contextmanager
 def _one_thread() -> Iterator[None]:
     """Let processes that are started here do their linear algebra on one thread."""
-    before = {name: os.environ.get(name) for name in SETTINGS.thread_variables}
-    os.environ.update(dict.fromkeys(SETTINGS.thread_variables, "1"))
+    before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     try:
         yield
     finally:

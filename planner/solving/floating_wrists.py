@@ -116,7 +116,8 @@ class FloatingSolution(Solution):
             found = _of_search(prepared, search, self.factor)
         if most is None:
             return LoadFactor(unfinished=deadline.expired()), found
-        return LoadFactor(most.factor, least=not most.sure), found
+        late = not most.sure and deadline.expired()
+        return LoadFactor(most.factor, least=not most.sure, unfinished=late), found
 
     def no_answer(self, prepared: PreparedStance) -> str:
         """Return a sentence about the missing equilibrium of the wrists, with a likely reason."""

@@ -14,9 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from hand_models.base import CruxError
+from hand_models.base import THREAD_VARIABLES, CruxError
 from planner.processes import starting
-from planner.processes.starting import SETTINGS
 from planner.processes.workers import Lost, Workers
 from tests.suite.helpers import workshop
 from tests.suite.helpers.patience import PATIENCE, soon
@@ -160,7 +159,7 @@ def test_processes_that_die_before_they_have_read_what_is_large_do_not_hang(monk
 
 
 def test_each_process_does_its_linear_algebra_on_one_thread(monkeypatch):
-    variables = SETTINGS.thread_variables
+    variables = THREAD_VARIABLES
     monkeypatch.setenv(variables[0], "7")
     monkeypatch.delenv(variables[1], raising=False)
     with Workers(workshop.threads, 1) as workers:
