@@ -335,6 +335,7 @@ async function show(view) {
   const stage = data.stages[at];
   showWords(stage);
   await drawScene(view);
+  performance.mark("scene drawn");
   await new Promise((go) => setTimeout(go)); // the picture first
   if (stage !== data.stages[at]) return; // another was asked for meanwhile
   if (data.stages.length > 1) {
