@@ -149,7 +149,7 @@ def serve_command(
     """Answer questions on zenoh until SIGTERM or Ctrl-C.
 
     Without -l only programs on this machine can ask. A file -c FILE.toml has options by their
-    names, such as metrics-port = 9100; those of the command line replace them. The hand of --hand
+    names, such as metrics-port = 9464; those of the command line replace them. The hand of --hand
     is that of every question; numbers that a question gives replace the hand's. The robot of
     --robot is the only one that is planned for, and gives the keys its name.
     """

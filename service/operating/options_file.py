@@ -19,7 +19,7 @@ def read_options(path: Path, context: click.Context, without: frozenset[str]) ->
     Parameters
     ----------
     path : Path
-        TOML with a line for each option, such as ``metrics-port = 9100``; a list for an option that
+        TOML with a line for each option, such as ``metrics-port = 9464``; a list for an option that
         may be given several times. Files are named as seen from the folder of this file.
     context : click.Context
         Context of the command.

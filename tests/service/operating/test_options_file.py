@@ -124,7 +124,7 @@ def test_the_bundled_file_and_unit_are_valid(capfd, monkeypatch):
     monkeypatch.setattr("service.operating.check_endpoints", lambda *_: None)
     assert run_command_line(["serve", "-c", str(folder / "serve.toml"), "--check"]) == DONE
     capfd.readouterr()
-    assert tomllib.loads(text)["metrics-port"] == 9100
+    assert tomllib.loads(text)["metrics-port"] == 9464
     unit = (folder / "crux.service").read_text("utf-8")
     assert re.search(r"^Type=notify$", unit, re.M)
     assert re.search(r"^WatchdogSec=\d+$", unit, re.M)
