@@ -228,7 +228,7 @@ function drawSlices(slices) {
 }
 
 function drawMargin() {
-  const stages = data.stages, bound = data.bound ?? null, measure = data.margin ?? "margin";
+  const stages = data.stages, bound = data.bound ?? null, measure = data.margin ?? "margin to the limit";
   const margins = stages.map((s) => data.margin ? s.load_factor ?? null : Number.isFinite(s.utilisation) ? s.limit - s.utilisation : null);
   const names = stages.map((s, n) => `${n} · ${plain(s.name)}`), known = margins.filter((m) => m !== null);
   const low = Math.max(Math.min(0, ...known), -1);
@@ -287,7 +287,7 @@ function listed(title, lines) {
 }
 
 function listedAdvice(advice) {
-  listed("Advice: changes that were planned and verified", advice.map((a) => `${a.holds ? "holds" : "less overloaded"}, utilisation ${fixed(a.utilisation, 2)}: ${a.sentence} `));
+  listed("Advice: changes that were planned and verified", advice.map((a) => `${a.holds ? "holds" : "less overloaded"}, utilisation ${fixed(a.utilisation, 3)}: ${a.sentence} `));
   const place = made("div", "", "table");
   advice.forEach((a, n) => {
     if (!a.moves) return;

@@ -70,7 +70,7 @@ def verdict_sentences(found: FoundClimb, at_least: float | None) -> Iterator[str
         move = f"move {deciding.move}, " if deciding.move else ""
         yield f"stage {deciding.stage} decides ({move}{what}; {where}){limit}"
     for each in found.raises[:3]:
-        yield f"  there {each.load_factor:.3f} with {each.change}"
+        yield f"  {each.load_factor:.3f} in that stage with {each.change}"
     for kind in found.refused[:3]:
         which = kind.phase if kind.limb is None else f"{kind.phase} of {kind.limb}"
         yield f"{counted(kind.count, 'move')} had no plan ({which}): {kind.reason}"
