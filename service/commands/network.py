@@ -349,16 +349,22 @@ def top_command(
         if once and not as_json:
             tables.console().print(operating.draw_top(now))
             return
-        shown = Live(console=tables.console(), auto_refresh=False, screen=not as_json)
+        out = tables.console()
+        # a file, or another program, gets one look after the other
+        live = out.is_terminal and not as_json
+        shown = Live(console=out, auto_refresh=False, screen=True)
         with ExitStack() as stack:
-            if not as_json:
+            if live:
                 stack.enter_context(shown)
             before = None
             while True:
                 if as_json:
                     tables.say(operating.top_json(now, before))
-                else:
+                elif live:
                     shown.update(operating.draw_top(now, before), refresh=True)
+                else:
+                    out.print(operating.draw_top(now, before))
+                    out.file.flush()
                 if once:
                     return
                 time.sleep(interval)
@@ -381,10 +387,12 @@ def replay_command(file: Path, own: options.Own, as_json: bool) -> int:
     with tables.progress("replaying", line=f"replaying {file}") as step:
         for _ in replay.run(recorded.questions(step)):
             pass
-    if recorded.whole is False:
-        tables.note(f"{file} was cut off; all that is whole in it has been replayed")
+    operating.note_losses(recorded, file)
     if as_json:
         tables.say(operating.replay_json(replay))
     else:
         operating.print_replay(replay, tables.console())
-    return tables.ExitStatus.OVERLOADED if replay.moved else tables.ExitStatus.DONE
+    if replay.moved:
+        return tables.ExitStatus.OVERLOADED
+    lost = recorded.damaged or (recorded.whole is False and not replay.asked)
+    return tables.ExitStatus.FAILED if lost else tables.ExitStatus.DONE

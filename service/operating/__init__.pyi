@@ -1,5 +1,9 @@
 from .checking import check_endpoints as check_endpoints, check_recording as check_recording
-from .moved import print_replay as print_replay, replay_json as replay_json
+from .moved import (
+    note_losses as note_losses,
+    print_replay as print_replay,
+    replay_json as replay_json,
+)
 from .options_file import read_options as read_options
 from .supervision import supervised as supervised
 from .top import (

@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hand_models.base import installed_version
-from service.recording import Moved, Replay
-from service.tables import counted, name, number, print_rows, text
+from service.recording import Moved, Recording, Replay
+from service.tables import counted, name, note, number, print_rows, text
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["print_replay", "replay_json"]
+__all__ = ["note_losses", "print_replay", "replay_json"]
+
+
+def note_losses(recording: Recording, file: Path) -> None:
+    """Note on standard error what of a recording's file could not be read."""
+    if recording.whole is False:
+        note(
+            f"{file} was cut off or is damaged after byte {recording.read:,}; all that is whole "
+            "before it has been replayed"
+        )
+    if recording.damaged:
+        chunks = counted(recording.damaged, "chunk")
+        note(f"{file} is damaged: {chunks} cannot be read, and their questions are left out")
 
 
 def replay_json(replay: Replay) -> dict[str, Any]:
@@ -22,6 +35,7 @@ def replay_json(replay: Replay) -> dict[str, Any]:
         "recorded": replay.recording.about["version"],
         "replayed": installed_version(),
         "whole": replay.recording.whole,
+        "damaged": replay.recording.damaged,
         "asked": replay.asked,
         "equal": replay.equal,
         "within_gap": replay.near,

@@ -87,6 +87,8 @@ class PublishedStream:
         self._published = -1
         self._unread: PublishedReply | None = None
         self._fault: CruxError | None = None
+        self._junk: CruxError | None = None
+        """Why the last message could not be read, until that is said."""
         self._last = -1
         self._away = self._closed = False
         self.lost = self.replaced = 0
@@ -183,12 +185,17 @@ class PublishedStream:
         Raises
         ------
         CruxError
-            If the stream could not be declared again, or a message of the service is none.
+            If the stream could not be declared again; once, if a message is none of a service's.
         """
         with self._changed:
-            self._changed.wait_for(lambda: self._unread or self._fault or self._closed, timeout)
+            self._changed.wait_for(
+                lambda: self._unread or self._junk or self._fault or self._closed, timeout
+            )
             if self._fault is not None:
                 raise self._fault
+            if self._junk is not None:
+                junk, self._junk = self._junk, None
+                raise junk
             found, self._unread = self._unread, None
             return found
 
@@ -213,7 +220,7 @@ class PublishedStream:
             try:
                 reply = read_reply(sample, PublishedReply)
             except CruxError as error:
-                self._fault = error
+                self._junk = error
                 self._changed.notify_all()
                 return
             number = -1 if reply.number is None else reply.number

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -57,10 +58,13 @@ class RecordingFile:
         self._writer.add_message(self._channels[topic], at, data, at, number % 2**32)
 
     def flush(self) -> None:
-        """Finish the chunk, and wait until it is on the disk."""
+        """Finish the chunk, and wait until it is on the disk; raise an OSError if it cannot be."""
         self._writer.flush()
         os.fsync(self._stream.fileno())
-        self._whole = os.fstat(self._stream.fileno()).st_size
+        state = os.fstat(self._stream.fileno())
+        if state.st_nlink == 0:
+            raise FileNotFoundError(errno.ENOENT, f"{self.path} was deleted")
+        self._whole = state.st_size
 
     def close(self) -> None:
         """Write the index, and close the file."""

@@ -6,6 +6,8 @@ import json
 import re
 import signal
 import socket
+import subprocess
+import sys
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
@@ -136,6 +138,19 @@ def test_top_shows_what_the_service_does(service):
     assert re.search(r"^ plan +\d+\.\d +1 +0 ", out, re.M), out
     assert max(map(len, out.splitlines())) <= 80
     assert f"recording  {service.file}"[:40] in out
+
+
+def test_top_prints_each_look_where_there_is_no_terminal(service):
+    command = [sys.executable, "-m", "service", "top", *service.flags(), "--interval", "0.1"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as top:
+        heads = []
+        for line in top.stdout:
+            heads += [line] if line.startswith("service ") else []
+            if len(heads) == 3:
+                break
+        top.send_signal(signal.SIGTERM)
+        top.communicate(timeout=PATIENCE)
+    assert all("version" in head for head in heads)
 
 
 def test_a_killed_service_leaves_all_that_it_has_flushed(killed):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 
 import msgspec
+import numpy as np
 import pytest
 from mcap.reader import make_reader
 
@@ -185,6 +187,60 @@ def test_a_file_that_is_cut_off_is_read_up_to_its_last_chunk(tmp_path, monkeypat
     assert recording.whole is False
     assert numbers == list(range(1, len(numbers) + 1))
     assert keep * 40 - 8 <= len(numbers) <= 40
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_damaged_bit_is_never_read_as_what_was_recorded(tmp_path, monkeypatch, closed):
+    """Whatever bit it is: questions are those that were recorded, or lost with a word."""
+    monkeypatch.setattr(module, "RECORDER_SETTINGS", module.RECORDER_SETTINGS._replace(flush=0.0))
+    path = tmp_path / "a.mcap"
+    recorder = Recorder(path, "robosimian")
+    for number in range(1, 9):
+        recorder.add(exchange(number))
+        assert soon(lambda: recorder.health().recorded == number)  # noqa: B023
+    if closed:
+        recorder.close()
+    data = path.read_bytes()
+    recorder.close()
+    before, rng = recorded(path), np.random.default_rng(0)
+    lost = 0
+    for place in rng.integers(len(data), size=400).tolist():
+        damaged = bytearray(data)
+        damaged[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(damaged)
+        try:
+            recording = Recording(path)
+            found = list(recording.questions())
+        except InvalidInputError:
+            continue
+        assert [each for each in before if each in found] == found
+        if len(found) < len(before):
+            lost += 1
+            # of a file that is not closed, nothing says how many chunks there should be
+            assert recording.damaged or recording.whole is False
+    assert lost > 100
+
+
+def test_a_recording_whose_folder_is_gone_is_said_and_begun_again(tmp_path, monkeypatch):
+    settings = module.RECORDER_SETTINGS._replace(flush=0.0, rest=0.01)
+    monkeypatch.setattr(module, "RECORDER_SETTINGS", settings)
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    recorder = Recorder(folder / "a.mcap", "robosimian")
+    recorder.add(exchange(1))
+    assert soon(lambda: recorder.health().recorded == 1)
+    shutil.rmtree(folder)
+    recorder.add(exchange(2))
+    assert soon(lambda: recorder.health().problem is not None)
+    folder.mkdir()
+
+    def records_again() -> bool:
+        recorder.add(exchange(3))
+        return recorder.health().problem is None
+
+    assert soon(records_again)
+    recorder.close()
+    assert {each.answer["cancelled"] for each in recorded(folder / "a.mcap")} == {3}
 
 
 def test_the_hand_of_a_service_is_recorded(tmp_path):

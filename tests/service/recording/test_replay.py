@@ -9,6 +9,7 @@ from hand_models.base import InvalidInputError
 from service.answering import Streams, handle, read_hand
 from service.recording import Exchange, Recorder, Recording, Replay
 from service.recording.differences import differences, same_within_gaps
+from service.replies import ErrorReply, PublishedReply
 from service.requests import LONGEST_DEADLINE
 from service.wire import Answer, Format, encode_error
 from service.wire.errors import BusyError
@@ -75,6 +76,25 @@ def test_what_depends_on_more_than_the_question_is_left_out(tmp_path):
     ask.add(PLAN, payload, Format.JSON, Answer(late, "application/json;crux.PlanReply@1"))
     replay = ask.replayed()
     assert (replay.equal, replay.moved, replay.left_out) == (0, 0, 3)
+
+
+def test_errors_of_published_wrenches_are_equal(tmp_path):
+    ask = Asked(tmp_path / "a.mcap")
+    stream = ask(STREAM, stream_request())["stream"]
+    wrench = msgspec.json.encode({"v": 1, "number": 0, "time": 0.0, "body_wrench": [None] * 6})
+    key = f"{STREAM}/{stream}/set_points"
+    error = handle(key, wrench, Format.JSON.value, streams=ask.streams, stream=stream)
+    reply = PublishedReply(
+        stream=stream,
+        number=0,
+        time=0.0,
+        age=0.0,
+        skipped=0,
+        error=msgspec.json.decode(error.payload, type=ErrorReply).error,
+    )
+    ask.add(key, wrench, Format.JSON, Answer(msgspec.json.encode(reply), Format.JSON.label(reply)))
+    replay = ask.replayed()
+    assert (replay.equal, replay.moved, replay.left_out) == (2, 0, 0)
 
 
 def test_what_has_moved_is_told_with_its_old_and_its_new_value(tmp_path):

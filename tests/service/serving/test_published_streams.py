@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 import zenoh
 
-from hand_models.base import InvalidInputError
+from hand_models.base import CruxError, InvalidInputError
 from planner import LostTile
 from service import CruxClient, SetPointsRequest, StreamRequest
 from service.processes import Job
@@ -374,6 +374,21 @@ def test_who_lost_its_worker_takes_up_again(slow: str) -> None:
         reply = received(stream, stream.publish([0.0] * 6))
         assert (reply.error, reply.skipped, stream.lost) == (None, 0, 0)
         assert reply.stream != lost.stream
+
+
+def test_a_message_that_is_no_set_points_is_said_once_and_ends_nothing(slow: str) -> None:
+    with (
+        CruxClient(client_config(slow)) as client,
+        client.publish_stream(declaration()) as stream,
+        zenoh.open(client_config(slow)) as other,
+    ):
+        other.put(stream_key(ROBOT, stream.declared.stream, ServiceName.SET_POINTS), b"junk")
+        with pytest.raises(CruxError):
+            stream.receive(PATIENCE)
+        number = stream.publish([0.001, 0.0, 0.0, 0.0, 0.0, 0.0])
+        reply = stream.receive(PATIENCE)
+        assert reply is not None
+        assert (reply.number, reply.error) == (number, None)
 
 
 def test_a_declaration_that_is_refused_raises(serving: str) -> None:
