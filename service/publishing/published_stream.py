@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, Protocol, Self
@@ -85,6 +86,8 @@ class PublishedStream:
         self._service_came = threading.Event()
         self._newest: WrenchRequest | None = None
         self._published = -1
+        self._times: deque[tuple[int, float]] = deque(maxlen=4096)
+        """Numbers and times of wrenches that may still be answered."""
         self._unread: PublishedReply | None = None
         self._fault: CruxError | None = None
         self._junk: CruxError | None = None
@@ -157,10 +160,12 @@ class PublishedStream:
             if self._closed:
                 raise InvalidInputError("is closed; declare another stream", field="stream")
             self._published += 1
+            now = time.time()
+            self._times.append((self._published, now))
             wrench = self._newest = WrenchRequest(
                 v=1,
                 number=self._published,
-                time=time.time(),
+                time=now,
                 # numbers of NumPy's own are not of the wire
                 body_wrench=tuple(map(float, body_wrench)),  # type: ignore[arg-type]
                 detail=detail,
@@ -226,7 +231,7 @@ class PublishedStream:
             number = -1 if reply.number is None else reply.number
             # of another one's wrenches, numbers may be larger
             late = 0 <= number < self._last or number > self._published
-            if reply.stream != self.declared.stream or late:
+            if reply.stream != self.declared.stream or late or self._is_others(number, reply.time):
                 return
             if reply.error is not None and reply.error.field == "stream":
                 # another service may not know yet that it is not its own
@@ -241,6 +246,12 @@ class PublishedStream:
                     reply = replace(reply, skipped=reply.skipped + unread.skipped)
                 self._unread = reply
             self._changed.notify_all()
+
+    def _is_others(self, number: int, at: float | None) -> bool:
+        """Return whether a number is that of another one's wrench: it has another time."""
+        while self._times and self._times[0][0] < number:
+            self._times.popleft()
+        return bool(self._times and self._times[0][0] == number and self._times[0][1] != at)
 
     def _see_stream(self, sample: zenoh.Sample) -> None:
         """See the token of a stream come or go: a link that is there again has lost nothing."""

@@ -13,7 +13,7 @@ from hand_models.base import CruxError, LimitError
 from service.answering import SERVICES_BY_NAME
 from service.processes import Job
 from service.publishing import PublishedWrench
-from service.requests import LEAST_REPLY_BYTES, LONGEST_DEADLINE, CancelRequest
+from service.requests import LEAST_REPLY_BYTES, LONGEST_DEADLINE, CancelRequest, WrenchRequest
 from service.ros2 import RosQuestion
 from service.serving.settings import SERVING_SETTINGS
 from service.wire import (
@@ -201,7 +201,9 @@ def received_question(query: AnyQuery, key: str, arrived: float, longest: float)
             secret = attached.to_bytes()
         if given is not None:
             cancels = name == ServiceName.CANCEL
-            check_size(len(given), CancelRequest if cancels else SERVICES_BY_NAME[name].request)
+            kind = CancelRequest if cancels else SERVICES_BY_NAME[name].request
+            published = isinstance(query, PublishedWrench)
+            check_size(len(given), WrenchRequest if published else kind)
             payload = given.to_bytes()
     except LimitError as error:
         fault = error

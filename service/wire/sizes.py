@@ -40,7 +40,9 @@ def check_size(size: int, kind: type) -> None:
     if size > most:
         advice = (
             "ask for one body wrench at a time, with a shorter id"
-            if kind in (SetPointsRequest, WrenchRequest)
+            if kind is SetPointsRequest
+            else "publish one body wrench at a time, and nothing else"
+            if kind is WrenchRequest
             else "let hands share a scan under stance.rocks, cut it to what is near them, or make "
             "its triangles larger (crux rock --spacing)"
         )

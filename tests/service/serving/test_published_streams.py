@@ -431,6 +431,13 @@ def test_a_client_takes_nothing_for_another_ones_wrenches(slow: str, listener: L
             name = stream.declared.stream
             assert soon(lambda: listener.numbers(name) == [10**6])
             assert received(stream, stream.publish([0.0] * 6)).number == 0
+            # one with a number of this client's, too
+            assert received(stream, stream.publish([0.0] * 6)).number == 1
+            listener.session.put(
+                key, packed(number=1, time=0.0, body_wrench=[0.0] * 6), encoding=MSGPACK
+            )
+            assert soon(lambda: listener.numbers(name) == [10**6, 0, 1, 1])
+            assert stream.receive(0.2) is None
         with pytest.raises(InvalidInputError, match="closed"):
             stream.publish(WRENCH)
         assert stream.receive() is None
