@@ -29,6 +29,7 @@ from hand_models.base import CruxError
 from service import CruxClient, SetPointsRequest
 from service.commands.stances import read_request
 from service.publishing import PublishedStream
+from service.recording import Recording
 from service.requests import PlanRequest, StreamRequest
 from service.ros2.definitions import package_folder
 from service.security import KeyFolder, Role
@@ -48,11 +49,19 @@ console = Console()
 
 
 class Site:
-    """Two services behind a router, all by keys over TLS; the first is a node of ROS 2, too."""
+    """Two services behind a router, by keys over TLS; both record, the first is a ROS 2 node, too.
+
+    Attributes
+    ----------
+    servers : list of Served
+    files : list of Path
+        Their recordings.
+    """
 
     def __init__(self, open_: ExitStack) -> None:
         self._open = open_
-        self._folder = Path(open_.enter_context(tempfile.TemporaryDirectory())) / "keys"
+        folder = Path(open_.enter_context(tempfile.TemporaryDirectory()))
+        self._folder = folder / "keys"
         endpoint = free_endpoint().replace("tcp/", "tls/")
         hosts, port = ("127.0.0.1",), int(endpoint.rpartition(":")[2])
         keys = KeyFolder.make(self._folder, ROBOT, hosts, port, 30, DOMAIN)
@@ -60,7 +69,11 @@ class Site:
         open_.enter_context(open_session(zenoh_config(file=self._folder / "relay.json5")))
         own = ("-c", str(self._folder / "service.json5"))
         ros = ("--ros2", "--domain", str(DOMAIN))
-        self.servers = [Served(endpoint, *own, *more, routed=True) for more in (ros, ())]
+        self.files = [folder / f"{name}.mcap" for name in ("first", "second")]
+        self.servers = [
+            Served(endpoint, *own, *more, "--record", str(file), routed=True)
+            for more, file in zip((ros, ()), self.files, strict=True)
+        ]
 
     def config(self, name: str) -> zenoh.Config:
         """Of a client of a name; its configuration has the router's address."""
@@ -144,8 +157,8 @@ def publishing(stream: PublishedStream, stop: threading.Event) -> Callable[[], d
 def soak(minutes: float, every: float, rate: float, seed: int) -> None:
     """Ask everything, with a process killed again and again; count, and watch the memory.
 
-    Two services behind a router, by keys over TLS: mixed questions of zenoh alone, plans spread
-    over both, set-points and published wrenches at a rate, and plans by ROS 2.
+    Two services behind a router, which record, by keys over TLS: mixed questions of zenoh alone,
+    plans spread over both, set-points and published wrenches at a rate, and plans by ROS 2.
     """
     rng, sizes, killed = random.Random(seed), list[tuple[float, int]](), 0
     stop, tallies = threading.Event(), dict[str, Tally]()
@@ -213,9 +226,15 @@ def soak(minutes: float, every: float, rate: float, seed: int) -> None:
         for server in site.servers:
             server.stop(signal.SIGTERM)
         codes = [server.process.returncode for server in site.servers]
+        recordings = [Recording(file) for file in site.files]
+        counts = [sum(1 for _ in each.questions()) for each in recordings]
+        whole = all(each.whole and not each.damaged for each in recordings)
     _tell(tallies, minutes, killed, sizes)
     console.print(f"published wrenches: {wrenches}")
     console.print(f"exit status of the services at SIGTERM: {codes}")
+    console.print(
+        f"questions recorded: {counts}; the files are {'whole' if whole else 'not whole'}"
+    )
 
 
 def _tell(
