@@ -187,7 +187,8 @@ class Replay:
         old = recorded.answer
         if published:
             old = old["set_points"] or {"error": old["error"]}
-            new = new if kind != ErrorReply.__name__ else {"error": new["error"]}
+            if kind == ErrorReply.__name__:
+                new = {"error": new["error"]}
             kind = recorded.kind
         self.asked[_name_of(about.key)] += 1
         return self._compared(about.number, kind, recorded.kind, old, new)

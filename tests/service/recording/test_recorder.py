@@ -29,6 +29,16 @@ def exchange(number: int = 0, form: Format = Format.JSON, request: bytes | None 
     return Exchange(KEY, 0.5, form.value, asked, answer, "me", 0.125)
 
 
+def flushed_each_time(path, monkeypatch, count: int) -> Recorder:
+    """A recorder that has so many exchanges, each in a chunk of its own on the disk."""
+    monkeypatch.setattr(module, "RECORDER_SETTINGS", module.RECORDER_SETTINGS._replace(flush=0.0))
+    recorder = Recorder(path, "robosimian")
+    for number in range(1, count + 1):
+        recorder.add(exchange(number))
+        assert soon(lambda: recorder.health().recorded == number)  # noqa: B023
+    return recorder
+
+
 def recorded(path) -> list:
     return list(Recording(path).questions())
 
@@ -172,12 +182,8 @@ def test_a_full_disk_ends_the_file_where_it_is_whole_and_another_is_begun(tmp_pa
 
 @pytest.mark.parametrize("keep", [0.3, 0.6, 0.9])
 def test_a_file_that_is_cut_off_is_read_up_to_its_last_chunk(tmp_path, monkeypatch, keep):
-    monkeypatch.setattr(module, "RECORDER_SETTINGS", module.RECORDER_SETTINGS._replace(flush=0.0))
     path = tmp_path / "a.mcap"
-    recorder = Recorder(path, "robosimian")
-    for number in range(1, 41):
-        recorder.add(exchange(number))
-        assert soon(lambda: recorder.health().recorded == number)  # noqa: B023
+    recorder = flushed_each_time(path, monkeypatch, 40)
     data = path.read_bytes()
     recorder.close()
     cut = tmp_path / "cut.mcap"
@@ -192,12 +198,8 @@ def test_a_file_that_is_cut_off_is_read_up_to_its_last_chunk(tmp_path, monkeypat
 @pytest.mark.parametrize("closed", [True, False])
 def test_a_damaged_bit_is_never_read_as_what_was_recorded(tmp_path, monkeypatch, closed):
     """Whatever bit it is: questions are those that were recorded, or lost with a word."""
-    monkeypatch.setattr(module, "RECORDER_SETTINGS", module.RECORDER_SETTINGS._replace(flush=0.0))
     path = tmp_path / "a.mcap"
-    recorder = Recorder(path, "robosimian")
-    for number in range(1, 9):
-        recorder.add(exchange(number))
-        assert soon(lambda: recorder.health().recorded == number)  # noqa: B023
+    recorder = flushed_each_time(path, monkeypatch, 8)
     if closed:
         recorder.close()
     data = path.read_bytes()
