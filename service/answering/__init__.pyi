@@ -8,6 +8,7 @@ from .climbs import (
     seek_climb as seek_climb,
 )
 from .dispatch import (
+    ADVICE_TIME as ADVICE_TIME,
     SERVICES_BY_NAME as SERVICES_BY_NAME,
     answer_plan as answer_plan,
     answer_with_advice as answer_with_advice,

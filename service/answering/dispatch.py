@@ -48,6 +48,7 @@ from service.wire import (
 )
 
 __all__ = [
+    "ADVICE_TIME",
     "SERVICES_BY_NAME",
     "answer_plan",
     "answer_with_advice",
@@ -56,6 +57,9 @@ __all__ = [
 ]
 
 log = logging.getLogger(__name__)
+
+ADVICE_TIME: Final = 30.0
+"""Timeout of a search for advice that a command adds by itself [s]."""
 
 
 def answer_plan(

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 import planner
-from service import tables
+from service import answering, tables
 
 __all__ = ["write_page"]
-
-ADVICE_TIME: Final = 30.0
-"""Timeout of the search for advice at the crux, as of ``crux plan`` [s]."""
 
 
 def write_page(result: planner.RouteResult, page: Path) -> None:
@@ -42,7 +38,7 @@ def write_page(result: planner.RouteResult, page: Path) -> None:
         name = result.route.name
         with (
             tables.working(f"searching for feasible changes of stage {crux} of {name}"),
-            planner.deadline.within(ADVICE_TIME),
+            planner.deadline.within(answering.ADVICE_TIME),
         ):
             advised = planner.with_advice(result.stages[crux].question, hardest)
         plans = (*result.plans[:crux], advised, *result.plans[crux + 1 :])

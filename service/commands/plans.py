@@ -107,7 +107,7 @@ def plan_command(
         _print(answer, bare, parts, brief)
         if advised or (not brief and not _holds(answer)):
             # [s] with --advice the search has no timeout of its own
-            seconds = None if advised else 30.0
+            seconds = None if advised else answering.ADVICE_TIME
             started = None if request.deadline is None else begun
             with planner.deadline.within(request.deadline or seconds, started=started):
                 answer = _with_advice(answer, brief)
