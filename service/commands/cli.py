@@ -237,7 +237,7 @@ def run_command_line(arguments: Sequence[str] | None = None) -> int:
         return ExitStatus.FAILED
     except OSError as error:
         if error.filename is not None:
-            return _complain(str(error), ExitStatus.FAILED)
+            return _complain(f"{error.filename}: {error.strerror}", ExitStatus.FAILED)
         _drop_output()
         return _complain(
             f"cannot write standard output: {error.strerror or error}", ExitStatus.FAILED

@@ -44,7 +44,7 @@ def read_options(path: Path, context: click.Context, without: frozenset[str]) ->
     known = {name: option for name, option in known.items() if name not in without}
     found: dict[str, Any] = {}
     with in_file(str(path)):
-        for name, value in tomllib.loads(path.read_text("utf-8")).items():
+        for name, value in tomllib.loads(path.read_text("utf-8-sig")).items():
             option = known.get(name)
             if option is None:
                 valid = ", ".join(sorted(known))
@@ -65,6 +65,8 @@ def _value(option: click.Option, value: Any, folder: Path, context: click.Contex
             more = ", or a list of them" if option.multiple else ""
             raise InvalidInputError(f"must be {words}{more}, got {each!r}")
     if isinstance(option.type, click.Path):
+        if not all(entries):
+            raise InvalidInputError(f"must name a file, got {value!r}")
         entries = [str(folder / each) for each in entries]
     else:
         try:
