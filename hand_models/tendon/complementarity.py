@@ -1,4 +1,4 @@
-"""Linear complementarity problems by Lemke's method, and stick–slip of a tendon as one.
+"""Linear complementarity problems by Lemke's method, and stick–slip of tendons as such.
 
 Find z ≥ 0 with w = M z + q ≥ 0 and wᵀz = 0. Lemke's method: a covering vector c ≥ 0 makes
 (M, q + c z₀) easy for a large z₀; complementary pivots then lead z₀ down to zero along a path that,
@@ -21,10 +21,11 @@ Lemke's method always finds a solution.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hand_models.base import Array, SolverError
 
-__all__ = ["solve_lcp", "stick_slip"]
+__all__ = ["solve_lcp", "stick_slip", "stick_slips"]
 
 
 def solve_lcp(M: Array, q: Array, cover: Array) -> Array:
@@ -139,3 +140,74 @@ def stick_slip(travel: tuple[Array, Array], before: tuple[Array, Array]) -> Arra
     M = np.block([[travel[0], bounded], [before[0] - bounded.T, np.zeros((n, n))]])
     cover = np.concatenate([np.ones(m), np.zeros(n)])
     return solve_lcp(M, np.concatenate([travel[1], before[1]]), cover)[:m]
+
+
+def stick_slips(travel: tuple[Array, Array], before: tuple[Array, Array], known: Array) -> Array:
+    """Return the unknowns of F tendons, which say where they slip and which way, as `stick_slip`.
+
+    The a in [0, s] where v = 0, the a = 0 where v > 0 and the a = s where v < 0 are the zeros of
+    a − min(max(a − v, 0), s). Newton's method finds most of them in two or three steps, on the
+    systems of all tendons together. Tendons that it leaves are solved by Lemke's method.
+
+    Parameters
+    ----------
+    travel : tuple of ndarray, shapes (F, m, m) and (F, m)
+        (V, v_0) of each tendon.
+    before : tuple of ndarray, shapes (F, n, m) and (F, n)
+        (S, s_0) of each tendon; s ≥ 0 where the known unknowns are as given and the others 0.
+    known : ndarray, shape (F, m)
+        Values of unknowns that are given, and meet no condition; nan of all others.
+
+    Returns
+    -------
+    ndarray, shape (F, m)
+
+    Raises
+    ------
+    SolverError
+        If rounding errors keep a solution from being found.
+    """
+    (V, v_0), (S, s_0) = travel, before
+    found, good = _newton(V, v_0, S, s_0, known)
+    for i in np.flatnonzero(~good):
+        free, found[i] = np.isnan(known[i]), np.nan_to_num(known[i])
+        bounded = free[known.shape[1] - s_0.shape[1] :]
+        found[i, free] = stick_slip(
+            (V[i][np.ix_(free, free)], (v_0[i] + V[i] @ found[i])[free]),
+            (S[i][np.ix_(bounded, free)], (s_0[i] + S[i] @ found[i])[bounded]),
+        )
+    return found
+
+
+def _newton(
+    V: Array, v_0: Array, S: Array, s_0: Array, given: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return a of each tendon (F, m) by Newton's method, and whether it meets all conditions."""
+    (count, m), n = v_0.shape, s_0.shape[1]
+    free, fixed = np.isnan(given), np.nan_to_num(given)
+    bounds = np.zeros((count, m, m))
+    bounds[:, m - n :] = S
+    least, most = np.eye(m) * np.ones((count, 1, 1)), np.eye(m) - bounds
+    highest = np.full((count, m), np.inf)
+    # what the conditions may be off by: rounding, relative to the size of the problem
+    sizes = np.abs(np.concatenate((v_0, s_0, fixed), axis=1))
+    rounding = 1e-11 * sizes.max(axis=1, initial=0.0)
+    a, good = fixed, np.zeros(count, dtype=bool)
+    low, high = ~free, np.zeros_like(free)
+    for _ in range(8):
+        rows = np.where(low[..., None], least, np.where(high[..., None], most, V))
+        aims = np.where(low, fixed, -v_0)
+        aims[:, m - n :] = np.where(high[:, m - n :], s_0, aims[:, m - n :])
+        try:
+            a = np.linalg.solve(rows, aims[..., None])[..., 0]
+        except np.linalg.LinAlgError:
+            break
+        highest[:, m - n :] = (S @ a[..., None])[..., 0] + s_0
+        ways = a - (V @ a[..., None])[..., 0] - v_0
+        low, high = ~free | (ways <= 0.0), free & (ways >= highest) & (ways > 0.0)
+        off = np.abs(np.where(free, a - np.minimum(np.maximum(ways, 0.0), highest), 0.0))
+        good = off.max(axis=1, initial=0.0) <= rounding
+        good &= highest.min(axis=1, initial=0.0) >= -rounding
+        if good.all():
+            break
+    return a, good

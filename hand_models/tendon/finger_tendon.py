@@ -35,9 +35,9 @@ import numpy as np
 
 from hand_models.base import BASE_TOLERANCES, Array, InvalidInputError
 from hand_models.parameters import ParameterTable
-from hand_models.tendon.complementarity import stick_slip
+from hand_models.tendon.complementarity import stick_slips
 
-__all__ = ["FingerTendon", "TendonState"]
+__all__ = ["FingerTendon", "TendonBatch", "TendonState", "pad_tiles"]
 
 LEAST_FRICTION = 10.0 * BASE_TOLERANCES.relative
 """Largest coefficient of friction that counts as none: such a boundary never sticks."""
@@ -272,41 +272,13 @@ class FingerTendon:
 
         ``given``: changes of shears besides those by the shift, shape (n,) [N].
         """
-        k, c, n = np.array(self.contact_stiffness), self.pulley_ratio, len(self.pulley_radii)
-        pushed = k * self._of_phalanges("shift", shift)
-        pushed = pushed if given is None else pushed + given
-        wound = np.array(self.pulley_radii) * self._of_phalanges("turn", turn)
-        # how far a tile travels per newton, and a phalanx's share of tendon then [m/N]
-        give = 1.0 / (k + self.spring_stiffness)
-        unit = c**2 * float(give.mean())
-        # t_i = (1 − μ_i) t_{i−1} + 2 μ_i a_i by t_0 and the a of boundaries that have friction
-        mu = np.full(n, self.friction)
-        mu[0] = 0.0 if motor is None else self.entry_friction
-        rubs, columns = mu > LEAST_FRICTION, np.eye(n + 1)
-        rows = [columns[0]]
-        for mu_i, column in zip(mu, columns[1:], strict=True):
-            rows.append((1.0 - mu_i) * rows[-1] + 2.0 * mu_i * column)
-        # t_0 is unknown where the motor is held: its boundary moves only where it is slack
-        by_first, by_others = np.array(rows)[:, :1], np.array(rows)[:, 1:][:, rubs]
-        moves = np.flatnonzero(rubs)
-        if motor is None:
-            moves, tensions, first = np.append(0, moves), np.hstack([by_first, by_others]), 0.0
-        else:
-            tensions, first = by_others, motor
-        known = first * by_first[:, 0]
-
-        def passed(given: Array) -> Array:
-            """Return v, what the phalanges from each boundary on give, in newtons."""
-            return np.asarray(np.cumsum(given[::-1], axis=0)[::-1] / unit)
-
-        free = passed(wound - c * give * (c * (state.tensions - known[1:]) + pushed))[moves]
-        found = stick_slip(
-            (passed(c**2 * give[:, None] * tensions[1:])[moves], free),
-            (tensions[:-1][rubs], known[:-1][rubs]),
-        )
-        after = known[1:] + tensions[1:] @ found
-        travel = give * (c * (after - state.tensions) - pushed)
-        return after, state.shears + pushed + k * travel
+        own = self._of_phalanges
+        shift, turn, tensions = own("shift", shift), own("turn", turn), state.tensions
+        pushed = np.zeros(len(shift)) if given is None else given
+        rest = np.array([state.motor_tension]), tensions[None], state.shears[None]
+        batch = TendonBatch((self,), (motor is not None,))
+        after, shears = batch.changed(rest, shift[None], turn[None], pushed[None])
+        return after[0], shears[0]
 
     def _of_phalanges(self, field: str, values: Sequence[float] | Array | None) -> Array:
         n = len(self.pulley_radii)
@@ -321,3 +293,90 @@ class FingerTendon:
 def _check(field: str, value: object, valid: bool, needed: str) -> None:
     if not valid:
         raise InvalidInputError(f"must be {needed}, got {value}", field=field)
+
+
+class TendonBatch:
+    """The tendons of F fingers, whose stick and slip is solved at once.
+
+    Tendons over fewer tiles than others are padded at their ends with tiles that do not move.
+
+    Parameters
+    ----------
+    tendons : sequence of FingerTendon, length F
+    driven : sequence of bool, length F
+        Whether the motor keeps its tension, or stands still.
+    """
+
+    def __init__(self, tendons: Sequence[FingerTendon], driven: Sequence[bool]) -> None:
+        own = pad_tiles([np.ones(len(each.pulley_radii)) for each in tendons], 0.0)
+        self._stiffness = k = pad_tiles([each.contact_stiffness for each in tendons], 0.0)
+        self._radii = pad_tiles([each.pulley_radii for each in tendons], 0.0)
+        self._ratio = c = np.array([[each.pulley_ratio] for each in tendons])
+        springs = np.array([[each.spring_stiffness] for each in tendons])
+        # how far a tile travels per newton, and a phalanx's share of tendon then [m/N]
+        self._give = give = own / (k + np.where(own > 0.0, springs, 1.0))
+        unit = c**2 * (give.sum(axis=1) / own.sum(axis=1))[:, None]
+        self._driven = np.array(driven)
+        mu = own * [[each.friction] for each in tendons]
+        entries = np.array([each.entry_friction for each in tendons])
+        mu[:, 0] = np.where(self._driven, entries, 0.0)
+        n = own.shape[1]
+        # t_i = (1 − μ_i) t_{i−1} + 2 μ_i a_i by t_0 and the a of boundaries that have friction
+        rows = [np.eye(n + 1)[0] * np.ones((len(own), 1))]
+        for i in range(n):
+            loss = mu[:, i, None]
+            rows.append((1.0 - loss) * rows[-1] + 2.0 * loss * np.eye(n + 1)[i + 1])
+        tensions = np.stack(rows, axis=1)
+        self._before, self._after = tensions[:, :-1], tensions[:, 1:]
+        # v, what the phalanges from each boundary on give, in newtons; t_0 is unknown where the
+        # motor is held: its boundary moves only where it is slack
+        self._passed = np.triu(np.ones((n, n)))[[0, *range(n)]] / unit[..., None]
+        self._travel = self._passed @ ((c**2 * give)[..., None] * self._after)
+        self._known = np.where(mu > LEAST_FRICTION, np.nan, 0.0)
+
+    def changed(
+        self, state: tuple[Array, Array, Array], shift: Array, turn: Array, given: Array | float
+    ) -> tuple[Array, Array]:
+        """Return tensions and shears after a change of load, shapes (F, n) [N].
+
+        Parameters
+        ----------
+        state : tuple of ndarray, shapes (F,), (F, n), (F, n)
+            Tensions at the motor and in each phalanx, and shears of the tiles at rest [N].
+        shift, turn : ndarray, shape (F, n)
+            δx_i, displacement of each phalanx along the rock toward the finger's base [m]; δq_i,
+            turn of each joint, closing [rad].
+        given : ndarray, shape (F, n), or float
+            Changes of shears besides those by the shift [N].
+
+        Raises
+        ------
+        SolverError
+            If rounding errors keep the solution from being found.
+        """
+        (motor, tensions, shears), c, k, give = state, self._ratio, self._stiffness, self._give
+        pushed = k * shift + given
+        free = self._radii * turn - c * give * (c * tensions + pushed)
+        known = np.column_stack((np.where(self._driven, motor, np.nan), self._known))
+        found = stick_slips(
+            (self._travel, (self._passed @ free[..., None])[..., 0]),
+            (self._before, np.zeros(shift.shape)),
+            known,
+        )
+        after = (self._after @ found[..., None])[..., 0]
+        travel = give * (c * (after - tensions) - pushed)
+        return after, shears + pushed + k * travel
+
+
+def pad_tiles(rows: Sequence[Sequence[float] | Array], fill: float) -> Array:
+    """Return numbers of tiles as one array (F, n), from rows of different lengths.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of float, length F
+        One number for each tile of each finger.
+    fill : float
+        Number put at the end of rows with fewer than n tiles.
+    """
+    count = max(map(len, rows))
+    return np.array([[*row, *[fill] * (count - len(row))] for row in rows], dtype=float)

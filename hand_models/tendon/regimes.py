@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.base import BASE_TOLERANCES, Array, Indices
-from hand_models.tendon.finger_tendon import LEAST_FRICTION, FingerTendon
+from hand_models.tendon.finger_tendon import LEAST_FRICTION, FingerTendon, pad_tiles
 
-__all__ = ["MotorScheme", "TendonRegimes", "TendonResponse", "pad_tiles"]
+__all__ = ["MotorScheme", "TendonRegimes", "TendonResponse"]
 
 MotorScheme = Literal["held", "tension"]
 """Motor while the load changes: it stands still (``held``), or keeps its tension (``tension``)."""
@@ -49,20 +49,6 @@ class TendonResponse(NamedTuple):
     tensions: NDArray[Any]
     shears: NDArray[Any]
     regime: Indices
-
-
-def pad_tiles(rows: Sequence[Sequence[float] | Array], fill: float) -> Array:
-    """Return numbers of tiles as one array (F, n), from rows of different lengths.
-
-    Parameters
-    ----------
-    rows : sequence of sequence of float, length F
-        One number for each tile of each finger.
-    fill : float
-        Number put at the end of rows with fewer than n tiles.
-    """
-    count = max(map(len, rows))
-    return np.array([[*row, *[fill] * (count - len(row))] for row in rows], dtype=float)
 
 
 class TendonRegimes:

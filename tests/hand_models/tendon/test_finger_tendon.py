@@ -5,10 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 from hand_models import InvalidInputError
 from hand_models.parameters import ParameterTable, hand_table
-from hand_models.tendon import FingerTendon, TendonRegimes, TendonState
+from hand_models.tendon import (
+    FingerTendon,
+    TendonBatch,
+    TendonRegimes,
+    TendonState,
+    complementarity,
+)
 
 MU = 0.34
 CLOSING = 37.0
@@ -245,3 +252,58 @@ def test_a_tile_that_lets_go_keeps_the_tendons_laws(tile, mu, motor):
         assert 1.0 - mu - 1e-9 <= ratio <= 1.0 + mu + 1e-9
         if abs(v) > 1e-9:
             assert ratio == pytest.approx(1.0 - mu if v > 0.0 else 1.0 + mu)
+
+
+@st.composite
+def fingers_moved(draw):
+    """Fingers of which tiles may be off the rock, boundaries without friction, tendons slack."""
+    n, friction = draw(st.integers(1, 4)), st.sampled_from([0.0, 0.05, MU, 0.9])
+    of_tiles = st.lists(st.floats(-1.0, 1.0), min_size=n, max_size=n).map(np.array)
+    stiffness = st.lists(st.sampled_from([0.0, 4250.0, 8215.0]), min_size=n, max_size=n)
+    radii = st.lists(st.sampled_from([0.0, 0.002, 0.006]), min_size=n, max_size=n)
+    known = tuple(draw(stiffness)), draw(st.sampled_from([900.0, KP])), tuple(draw(radii))
+    finger = FingerTendon(CP, *known, draw(friction), draw(friction))
+    before = finger.closed(draw(st.sampled_from([0.0, 5.0, CLOSING])), 5.0 * draw(of_tiles) + 5.0)
+    size = draw(st.sampled_from([0.0, 1e-6, 1e-3, 1e-2]))
+    return finger, before, size * draw(of_tiles), 10.0 * size * draw(of_tiles), draw(st.booleans())
+
+
+@given(st.lists(fingers_moved(), min_size=1, max_size=6))
+@settings(max_examples=60)
+def test_fingers_solved_at_once_stick_and_slip_as_by_lemkes_method(drawn):
+    fingers, states, shifts, turns, driven = zip(*drawn, strict=True)
+
+    def padded(rows):
+        return np.array([[*row, *[0.0] * (4 - len(row))] for row in rows])
+
+    longest = max(map(len, shifts))
+    rest = padded([each.tensions for each in states]), padded([each.shears for each in states])
+    at_rest = np.array([each.motor_tension for each in states]), *(x[:, :longest] for x in rest)
+    shift, turn = padded(shifts)[:, :longest], padded(turns)[:, :longest]
+    tensions, shears = TendonBatch(fingers, driven).changed(at_rest, shift, turn, 0.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(complementarity, "_newton", none_by_newton)
+        for i, (finger, before, own, turned, keeps) in enumerate(drawn):
+            alone = (finger.kept if keeps else finger.held)(before, own, turned)
+            n = len(own)
+            np.testing.assert_allclose(tensions[i, :n], alone.tensions, rtol=1e-9, atol=1e-8)
+            np.testing.assert_allclose(shears[i, :n], alone.shears, rtol=1e-9, atol=1e-8)
+
+
+def none_by_newton(V, v_0, S, s_0, known):
+    """Leave every tendon to Lemke's method."""
+    return np.zeros(v_0.shape), np.zeros(len(v_0), dtype=bool)
+
+
+def test_newtons_method_solves_most_fingers(monkeypatch):
+    left = []
+    lemke = complementarity.stick_slip
+    monkeypatch.setattr(complementarity, "stick_slip", lambda *own: left.append(1) or lemke(*own))
+    rng = np.random.default_rng(5)
+    for _ in range(100):
+        finger = random_finger(rng)
+        shift, turn = random_motion(rng, len(finger.pulley_radii))
+        before = finger.closed(rng.uniform(5.0, 200.0), rng.uniform(0.0, 20.0, len(shift)))
+        finger.held(before, 10.0 * shift, turn)
+        finger.kept(before, shift, turn)
+    assert len(left) < 10
