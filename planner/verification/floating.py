@@ -4,48 +4,48 @@ Nothing is shared with the computation of the plan, which settles every finger i
 distinguishes the tendon's regimes. The postures in the plan are compared with the chain of
 phalanges and with the rock. Slips are measured along the rock between a tile's contacts before and
 after, and the pressure of its spring bed between them is integrated. Stick and slip of the tendon
-are solved as one complementarity problem (`FingerTendon.held`), the normals by the balance of the
+are solved as one complementarity problem (`TendonBatch`), the normals by the balance of the
 free joints (`JointBalance.solved`). Lateral loads of tiles and the force of the palm are compared
 with their laws (Section 5.3).
 """
 
 from __future__ import annotations
 
-import cmath
 import math
+from collections import defaultdict
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, Indices
-from hand_models.finger import PHALANGES
+from hand_models.base import SKEW_MATRICES, Array, Indices
+from hand_models.finger import PHALANGES, FingerModel
 from hand_models.hand import FINGERS, FingerFrame, SettledHand
-from hand_models.tendon import FingerTendon, TendonState, shear_stiffness
-from planner.prepare import HandBatch
+from hand_models.sections import Complexes, Flags
+from hand_models.tendon import FingerTendon, TendonBatch, pad_tiles, shear_stiffness
 from planner.result import PlanArrays, WristPlan
 from planner.verification.joint_balance import Fingers, JointBalance
 from planner.verification.residuals import FINGER_COUNT, TOLERANCES, PartNames, allowed_errors
-from planner.verification.rolling_contacts import RestingContact, TileFace
+from planner.verification.rolling_contacts import RestingContact, finger_contacts
 
 __all__ = ["recompute_floating"]
 
 
-def moved(place: Array, wrist: WristPlan) -> Array:
-    """Return the displacement of a point of the hand under a wrist's twist, shape (3,) [m].
+def moved(places: Array, twists: Array) -> Array:
+    """Return the displacements of n points of k hands under their wrists' twists, (k, n, 3) [m].
 
-    The rotation counts to second order, as in the model.
+    Rotations count to second order, as in the model.
 
     Parameters
     ----------
-    place : ndarray, shape (3,)
-        Point in H at rest [m].
-    wrist : WristPlan
-        The twist of the wrist.
+    places : ndarray, shape (k, n, 3)
+        Points in each H at rest [m].
+    twists : ndarray, shape (k, 6)
+        Twists of the wrists [m, rad].
     """
-    x, y, z = wrist.twist[3:]
-    turn = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(wrist.twist[:3] + turn @ place + turn @ turn @ place / 2.0)
+    turns = (twists[:, 3:] @ SKEW_MATRICES.reshape(3, 9)).reshape(-1, 3, 3)
+    turns = turns + turns @ turns / 2.0
+    return np.asarray(twists[:, None, :3] + places @ turns.swapaxes(1, 2))
 
 
 def recompute_floating(
@@ -74,171 +74,222 @@ def recompute_floating(
         Residual of each joint's balance, which a stop must carry, positive if closing [N·m].
     """
     known = names.known
-    allowed = allowed_errors(known, arrays).tolist()
     fingers = Fingers(*(part.copy() for part in balance.fingers(wound)))
-    # of some only the model knows how far their tiles slip
-    unknown: list[int] = []
-    for h, wrist in enumerate(arrays.wrists):
-        if wrist is not None:
-            for i in range(FINGER_COUNT):
-                finger = FINGER_COUNT * h + i
-                at = f"{names.limbs[h]}: {FINGERS[i]}"
-                if not _move(found, at, known, finger, arrays, wrist, wound, fingers, allowed[h]):
-                    unknown.append(finger)
-            _check_palm(found, names.limbs[h], known.hands[h], arrays.palms[h], wrist, allowed[h])
+    rest = _resting(known.hands, tuple([wrist and wrist.driven for wrist in arrays.wrists]))
+    allowed, hands = allowed_errors(known, arrays), rest.which[::FINGER_COUNT] // FINGER_COUNT
+    wrong, exact = _move(rest, arrays, wound, fingers, allowed)
+    for k, h in enumerate(hands.tolist()):
+        for i, name in enumerate(FINGERS):
+            texts = wrong.get(FINGER_COUNT * k + i, ())
+            found.extend([f"{names.limbs[h]}: {name}{text}" for text in texts])
+        wrist = arrays.wrists[h]
+        assert wrist is not None
+        _check_palm(found, names.limbs[h], known.hands[h], arrays.palms[h], wrist, allowed[h])
     normal, left = balance.solved(fingers)
+    # of some only the model knows how far their tiles slip
+    unknown = rest.which[~exact]
     taken = known.places.phalanges[unknown]
     normal[taken], left[unknown] = arrays.loads[taken, 1], 0.0
     return fingers.shear, normal, left
 
 
 def _move(
-    found: list[str],
-    name: str,
-    known: HandBatch,
-    finger: int,
-    arrays: PlanArrays,
-    wrist: WristPlan,
-    wound: Array,
-    fingers: Fingers,
-    allowed: float,
-) -> bool:
-    """Move a finger with its wrist, and check what a plan says of it but for its normals.
+    rest: _RestingFingers, arrays: PlanArrays, wound: Array, fingers: Fingers, allowed: Array
+) -> tuple[dict[int, list[str]], Flags]:
+    """Move fingers with their wrists, and check what a plan says of them but for their normals.
 
-    Of ``fingers`` its shears, torques and places become those that it has there. Its loads may be
-    off by ``allowed`` [N]. Returns whether it is known how far its tiles slip.
+    Of ``fingers`` their shears, torques and places become those that they have there. The loads of
+    each hand may be off by ``allowed`` [N]. Returns what is wrong with some of the k fingers, and
+    of which it is known how far their tiles slip.
     """
-    h, index = divmod(finger, FINGER_COUNT)
-    hand = known.hands[h]
-    settled, rest = hand.fingers[index], _resting(hand, index)
-    model = settled.model
-    frame, own, tiles = rest.frame, rest.own, known.places.phalanges[finger]
-    rows = np.flatnonzero(known.places.finger == finger)
-    fingers.points[rows], fingers.axes[rows] = arrays.points[rows], arrays.axes[rows]
-    outer = len(own) > len(PHALANGES)
-    step = moved(frame.joint, wrist)
-    joint = np.array([step @ frame.along, step[2]])
-    angles, slips, exact = [], [], True
-    parts = zip(tiles, rest.faces, rest.contacts, strict=True)
-    for j, (tile, face, contact) in enumerate(parts):
-        drag, place = arrays.axes[tile, 0], arrays.points[tile] - frame.joint
-        way = np.array([-drag @ frame.along, -drag[2]])
-        point = np.array([place @ frame.along, place[2]])
-        arm = point - joint
-        rise = way[0] * arm[1] - way[1] * arm[0]
-        aside, beside = float(place @ frame.across), settled.contacts[j].across
-        if not abs(rise - face.height) <= 1e-9:  # [m] rounding
-            found.append(f"{name}: {PHALANGES[j]} contact is {rise:.6g} m above its joint")
-        if not abs(aside - beside) <= 1e-9:  # [m] rounding
-            found.append(f"{name}: {PHALANGES[j]} contact is {aside:.6g} m beside its finger")
-        dragged = complex(way[0], way[1]) * cmath.rect(1.0, -rest.tilts[j])
-        angles.append(cmath.phase(dragged))
-        fingers.joints[finger, j] = joint
-        slip: float | None = 0.0
-        if contact is not None:
-            slip, off = contact.slip(point, float(arm @ way), way)
-            exact &= slip is not None
-            if not abs(off) <= TOLERANCES.contact:
-                found.append(
-                    f"{name}: {PHALANGES[j]} contact is {off:.3g} m from where its tile bears"
-                )
-        slips.append(slip or 0.0)
-        joint = joint + model.joint_spacing * np.array([dragged.real, dragged.imag])
-    change = np.array(angles) - rest.angles
-    change = change - math.tau * np.round(change / math.tau)
-    turns = np.diff(change, prepend=-float(wrist.twist[3:] @ frame.across))
-    _check_stretches(found, name, rest, wrist, arrays.loads[rows, 0])
-    off = np.abs(_laterals(rest, wrist) - arrays.loads[rows, 2]).max()
-    if exact:
-        tension, tendon = float(wound[finger]), rest.tendon
-        state = TendonState(tension, tension * rest.losses, fingers.shear[rows])
-        base = -float(moved(hand.positions[own[0]], wrist) @ frame.along)
-        held = (tendon.kept if wrist.driven else tendon.held)(
-            state,
-            [base, *slips] if outer else slips,
-            [0.0, *turns] if outer else turns,
-        )
-        fingers.shear[rows] = held.shears
-        springs = np.array(model.joint_stiffness) * (np.diff(rest.angles, prepend=0.0) + turns)
-        torques = held.tensions[-len(PHALANGES) :] * model.pulley_radii
-        fingers.torques[finger] = torques - (np.array(model.joint_preload) + springs)
-        off = max(off, abs(held.tensions[0] - arrays.tensions[finger]))
-    else:
-        fingers.shear[rows] = arrays.loads[rows, 0]
-    if not off <= allowed:
-        found.append(f"{name} does not hold what the plan says")
-    return exact
+    wrong: dict[int, list[str]] = defaultdict(list)
+    which, own, rows, columns = rest.which, rest.own, rest.rows, rest.columns
+    every, tiles = rows[own], np.take_along_axis(rows, columns, axis=1)
+    fingers.points[every], fingers.axes[every] = arrays.points[every], arrays.axes[every]
+    twists = np.array([wrist.twist for wrist in arrays.wrists if wrist is not None])
+    twists = twists.repeat(FINGER_COUNT, axis=0)
+    steps, places = moved(rest.places, twists), arrays.points[tiles] - rest.places[:, :1]
+    base = (steps[:, :2] @ rest.planes)[..., 0]
+    ways, points = -(arrays.axes[tiles, 0] @ rest.planes)[..., 0], (places @ rest.planes)[..., 0]
+    dragged = ways * rest.tilts
+    joints = np.column_stack((base[:, 0], rest.model.joint_spacing * dragged[:, :-1])).cumsum(
+        axis=1
+    )
+    fingers.joints[which] = np.stack((joints.real, joints.imag), axis=2)
+    arms, beside = (points - joints) * ways.conj(), (places @ rest.across)[..., 0]
+    misplaced = ~(np.abs((arms.imag - rest.heights, beside - rest.besides)) <= 1e-9)  # [m] rounding
+    for k, j in np.argwhere(misplaced.any(axis=0)).tolist():
+        at = f": {PHALANGES[j]} contact is"
+        if misplaced[0, k, j]:
+            wrong[k].append(f"{at} {arms.imag[k, j]:.6g} m above its joint")
+        if misplaced[1, k, j]:
+            wrong[k].append(f"{at} {beside[k, j]:.6g} m beside its finger")
+    turns = np.angle(dragged) - rest.angles
+    turns -= math.tau * np.round(turns / math.tau)
+    turns[:, 1:] -= turns[:, :-1].copy()
+    turns[:, 0] += (twists[:, None, 3:] @ rest.across)[:, 0, 0]
+    # what is no number is wrong, and moves nothing
+    finite = np.isfinite(arms + turns).all(axis=1)
+    slips, exact = _slips(rest, wrong, points, arms.real, ways, finite)
+    shift, turn = np.zeros((2, *rows.shape))
+    shift[:, 0] = -base[:, 1].real
+    np.put_along_axis(shift, columns, slips, axis=1)
+    np.put_along_axis(turn, columns, turns, axis=1)
+    shift[~finite], turn[~finite] = 0.0, 0.0
+    tension, loads = wound[which], arrays.loads[rows]
+    state = tension, tension[:, None] * rest.losses, np.where(own, fingers.shear[rows], 0.0)
+    tensions, shears = rest.tendons.changed(state, shift, turn, 0.0)
+    shears[~finite] = np.nan
+    fingers.shear[every] = np.where(exact[:, None], shears, loads[..., 0])[own]
+    torques = np.take_along_axis(tensions, columns, axis=1) * rest.model.pulley_radii
+    torques -= rest.springs + np.array(rest.model.joint_stiffness) * turns
+    fingers.torques[which[exact]] = torques[exact]
+    _check_stretches(wrong, rest, arrays)
+    # the lateral loads for which spines and beam give what the wrist asks
+    aside = np.where(rest.resists[..., None], steps[:, 2:] @ rest.across, 0.0)
+    aside = np.linalg.solve(rest.compliance, aside)[..., 0]
+    off = np.where(own, np.abs(aside - loads[..., 2]), 0.0).max(axis=1)
+    tendon = np.where(exact, np.abs(tensions[:, 0] - arrays.tensions[which]), 0.0)
+    held = (np.maximum(off, tendon) <= allowed[which // FINGER_COUNT]) & finite
+    for k in np.flatnonzero(~held).tolist():
+        wrong[k].append(" does not hold what the plan says")
+    return wrong, exact
 
 
-class _RestingFinger(NamedTuple):
-    """A finger of a settled hand at rest: what does not change where its wrist goes.
+def _slips(
+    rest: _RestingFingers,
+    wrong: dict[int, list[str]],
+    points: Complexes,
+    along: Array,
+    ways: Complexes,
+    finite: Flags,
+) -> tuple[Array, Flags]:
+    """Return the slip of each tile (k, 3) [m], and of which fingers it is known; check contacts."""
+    slips, exact = np.zeros(along.shape), np.ones(len(along), dtype=bool)
+    for k in np.flatnonzero(finite).tolist():
+        numbers = zip(points[k].tolist(), along[k].tolist(), ways[k].tolist(), strict=True)
+        for j, (contact, at) in enumerate(zip(rest.contacts[k], numbers, strict=True)):
+            if contact is not None:
+                slip, off = contact.slip(*at)
+                slips[k, j], exact[k] = slip or 0.0, exact[k] and slip is not None
+                if not abs(off) <= TOLERANCES.contact:
+                    text = f"{PHALANGES[j]} contact is {off:.3g} m from where its tile bears"
+                    wrong[k].append(f": {text}")
+    return slips, exact
+
+
+class _RestingFingers(NamedTuple):
+    """The k fingers of settled hands whose wrists give, at rest: what does not change as they do.
+
+    Fingers have up to n tiles; what is of fewer is padded at its end.
 
     Attributes
     ----------
-    frame : FingerFrame
-    own : ndarray of int, shape (n,)
-        Its tiles among those of the hand.
-    faces : tuple of TileFace
-        Face of the tile of each phalanx.
-    contacts : tuple of RestingContact or None
+    which : ndarray of int, shape (k,)
+        The fingers, counted through all hands.
+    rows : ndarray of int, shape (k, n)
+        Their tiles, counted through all hands.
+    own : ndarray of bool, shape (k, n)
+        Where these are no padding.
+    columns : ndarray of int, shape (k, 3)
+        Which of them are on the phalanges.
+    places : ndarray, shape (k, 2 + n, 3)
+        Places of the proximal joint, the first tile, and all tiles in H [m].
+    planes : ndarray of complex, shape (k, 3, 1)
+        What makes x + i z of the finger's plane from vectors in H.
+    across : ndarray, shape (k, 3, 1)
+        Unit vector across the plane.
+    heights, besides, angles : ndarray, shape (k, 3)
+        Height of each contact above its joint, and how far beside the plane it is [m]; angle of
+        each phalanx [rad].
+    tilts : ndarray of complex, shape (k, 3)
+        Turn from the way along each contact to its phalanx.
+    contacts : tuple of tuple of RestingContact or None
         Contact of each tile with the rock; None of one that touches none.
-    angles, tilts : ndarray, shape (3,)
-        Angle of each phalanx, and of its tile's contact to it [rad].
-    tendon : FingerTendon
-    losses : ndarray, shape (n,)
-        Tension at each tile over that at the motor.
-    laterals : ndarray of int
-        Which of its tiles resist sideways.
-    places : ndarray, shape (len(laterals), 3)
-        Positions of these in H [m].
-    compliance : ndarray, shape (len(laterals), len(laterals))
+    tendons : TendonBatch
+    stiffness, losses : ndarray, shape (k, n)
+        Stiffness of each tile on the rock [N/m]; tension there over that at the motor.
+    resists : ndarray of bool, shape (k, n)
+        Which tiles resist sideways.
+    compliance : ndarray, shape (k, n, n)
         Displacement of these sideways by their loads [m/N].
+    model : FingerModel
+    springs : ndarray, shape (k, 3)
+        Torque of each joint's spring [N·m].
+    tiles_of : tuple of slice
+        Tiles of each hand whose wrist gives.
     """
 
-    frame: FingerFrame
-    own: Indices
-    faces: tuple[TileFace, ...]
-    contacts: tuple[RestingContact | None, ...]
-    angles: Array
-    tilts: tuple[float, ...]
-    tendon: FingerTendon
-    losses: Array
-    laterals: Indices
+    which: Indices
+    rows: Indices
+    own: Flags
+    columns: Indices
     places: Array
+    planes: Complexes
+    across: Array
+    heights: Array
+    besides: Array
+    angles: Array
+    tilts: Complexes
+    contacts: tuple[tuple[RestingContact | None, ...], ...]
+    tendons: TendonBatch
+    stiffness: Array
+    losses: Array
+    resists: Flags
     compliance: Array
+    model: FingerModel
+    springs: Array
+    tiles_of: tuple[slice, ...]
 
 
-@lru_cache(maxsize=256)  # the fingers of as many hands as `SETTLED_LIMITS` keeps stances
-def _resting(hand: SettledHand, index: int) -> _RestingFinger:
-    """Return a finger of a settled hand at rest, by its index among `FINGERS`."""
-    settled, model = hand.fingers[index], hand.fingers[index].model
-    frame = hand.hand.frames(hand.grasp.outer_rotation)[index]
-    own = np.flatnonzero(hand.finger_of == index)
-    section = hand.hand.section(FINGERS[index], hand.hold, hand.grasp, hand.seating.pose)
-    depths = model.depths(len(own) > len(PHALANGES)) * hand.closing_tension
-    faces, contacts = [], list[RestingContact | None]()
-    for contact, depth in zip(settled.contacts, depths, strict=True):
-        faces.append(face := TileFace.of(contact, model, float(depth)))
-        at = np.array(contact.point(model.tile_height))
-        if section is None or contact.kind not in ("face", "edge"):
-            contacts.append(None)
-        else:
-            contacts.append(RestingContact.of(section, face, at))
-    held = np.flatnonzero(hand.engagement[own])
-    held = held if hand.grasp.lateral else held[:0]
-    places = hand.positions[own[held]]
-    return _RestingFinger(
-        frame=frame,
-        own=own,
-        faces=tuple(faces),
-        contacts=tuple(contacts),
-        angles=np.array([contact.angle for contact in settled.contacts]),
-        tilts=tuple([contact.tilt for contact in settled.contacts]),
-        tendon=_tendon(hand, own),
-        losses=np.asarray((1.0 - hand.hand.finger.friction) ** np.arange(len(own), dtype=float)),
-        laterals=held,
+@lru_cache(maxsize=64)  # as many stances as `SETTLED_LIMITS` keeps
+def _resting(hands: tuple[SettledHand, ...], driven: tuple[bool | None, ...]) -> _RestingFingers:
+    """Return the fingers of settled hands, of which some have driven wrists (None: fixed)."""
+    starts = np.cumsum([0, *(len(hand.finger_of) for hand in hands)]).tolist()
+    giving = [h for h, drives in enumerate(driven) if drives is not None]
+    each = [(hands[h], i) for h in giving for i in range(FINGER_COUNT)]
+    frames = [hand.hand.frames(hand.grasp.outer_rotation)[i] for hand, i in each]
+    owns = [np.flatnonzero(hand.finger_of == i) for hand, i in each]
+    faces, contacts = zip(*(finger_contacts(hand, i) for hand, i in each), strict=True)
+    tendons = [_tendon(hand, own) for (hand, _), own in zip(each, owns, strict=True)]
+    n, model = max(map(len, owns)), hands[0].hand.finger
+    rows, resists = np.zeros((len(each), n), dtype=np.intp), np.zeros((len(each), n), dtype=bool)
+    places, compliance = np.zeros((len(each), 2 + n, 3)), np.eye(n) * np.ones((len(each), 1, 1))
+    for k, ((hand, _), frame, own) in enumerate(zip(each, frames, owns, strict=True)):
+        rows[k, : len(own)] = starts[giving[k // FINGER_COUNT]] + own
+        places[k, 0], places[k, 1] = frame.joint, hand.positions[own[0]]
+        places[k, 2 : 2 + len(own)] = hand.positions[own]
+        held = np.flatnonzero(hand.engagement[own]) if hand.grasp.lateral else own[:0]
+        resists[k, held] = True
+        give = _lateral_compliance(hand, frame, own[held], hand.positions[own[held]])
+        compliance[k][np.ix_(held, held)] = give
+    counts = np.array(list(map(len, owns)))[:, None]
+    settled = [hand.fingers[i].contacts for hand, i in each]
+    angles = np.array([[contact.angle for contact in of_finger] for of_finger in settled])
+    tilts = np.array([[contact.tilt for contact in of_finger] for of_finger in settled])
+    springs = np.array(model.joint_stiffness) * np.diff(angles, prepend=0.0, axis=1)
+    losses = np.array([hand.hand.finger.friction for hand, _ in each])
+    return _RestingFingers(
+        which=np.concatenate([FINGER_COUNT * h + np.arange(FINGER_COUNT) for h in giving]),
+        rows=rows,
+        own=np.arange(n) < counts,
+        columns=counts - len(PHALANGES) + np.arange(len(PHALANGES)),
         places=places,
-        compliance=_lateral_compliance(hand, frame, own[held], places),
+        planes=np.array([frame.along + 1j * np.eye(3)[2] for frame in frames])[..., None],
+        across=np.array([frame.across for frame in frames])[..., None],
+        heights=np.array([[face.height for face in of_finger] for of_finger in faces]),
+        besides=np.array([[contact.across for contact in of_finger] for of_finger in settled]),
+        angles=angles,
+        tilts=np.exp(-1j * tilts),
+        contacts=contacts,
+        tendons=TendonBatch(tendons, [bool(driven[h]) for h in giving for _ in FINGERS]),
+        stiffness=pad_tiles([tendon.contact_stiffness for tendon in tendons], 0.0),
+        losses=(1.0 - losses[:, None]) ** np.arange(n),
+        resists=resists,
+        compliance=compliance,
+        model=model,
+        springs=np.array(model.joint_preload) + springs,
+        tiles_of=tuple([slice(*starts[h : h + 2]) for h in giving]),
     )
 
 
@@ -271,23 +322,27 @@ def _contact_stiffness(hand: SettledHand, own: Indices, known: FingerTendon) -> 
 
 
 def _check_stretches(
-    found: list[str],
-    name: str,
-    rest: _RestingFinger,
-    wrist: WristPlan,
-    shears: Array,
+    wrong: dict[int, list[str]], rest: _RestingFingers, arrays: PlanArrays
 ) -> None:
-    """Check how far a plan stretches a finger's tiles, by their returned shears (n,) [N]."""
+    """Check how far a plan stretches the fingers' tiles, by the shears that it returns."""
+    said = np.full(len(arrays.loads), np.nan)
+    told = np.zeros(len(said), dtype=bool)
+    for own, wrist in zip(rest.tiles_of, filter(None, arrays.wrists), strict=True):
+        if wrist.stretches is not None:
+            given = wrist.stretches[: own.stop - own.start]
+            those = slice(own.start, own.start + len(given))
+            said[those], told[those] = given, True
+    stretches, shears, k = said[rest.rows], np.abs(arrays.loads[rest.rows, 0]), rest.stiffness
+    silent = np.any(rest.own & ~told[rest.rows], axis=1)
     # the force that would stretch each tile as far as the plan says
-    stiffness = np.array(rest.tendon.contact_stiffness)
-    held = stiffness > 0.0
-    if wrist.stretches is None or not rest.own.max() < len(wrist.stretches):
-        found.append(f"{name}: the plan does not say how far its tiles are stretched")
-        return
-    said = wrist.stretches[rest.own]
-    off = np.abs(np.where(held, stiffness * said - np.abs(shears), said)).max()
-    if not off <= 1e-9 * max(1.0, float(np.abs(shears).max())):  # [N], of idle tiles [m]: rounding
-        found.append(f"{name}: tiles are not stretched by what the plan says")
+    off = np.abs(np.where(k > 0.0, k * stretches - shears, stretches))
+    off, most = (np.where(rest.own, x, 0.0).max(axis=1) for x in (off, shears))
+    # [N], of idle tiles [m]: rounding
+    for i in np.flatnonzero(~(off <= 1e-9 * np.fmax(1.0, most)) | silent).tolist():
+        if silent[i]:
+            wrong[i].append(": the plan does not say how far its tiles are stretched")
+        else:
+            wrong[i].append(": tiles are not stretched by what the plan says")
 
 
 def _lateral_compliance(
@@ -302,15 +357,6 @@ def _lateral_compliance(
     give += near**2 * (3.0 * far - near) / (6.0 * body.bending_stiffness)
     give += np.outer(high, high) * near / body.torsional_stiffness
     return np.asarray(give)
-
-
-def _laterals(rest: _RestingFinger, wrist: WristPlan) -> Array:
-    """Return the lateral loads for which spines and beam give what the wrist asks, shape (n,)."""
-    found = np.zeros(len(rest.own))
-    if len(rest.laterals):
-        away = [float(moved(place, wrist) @ rest.frame.across) for place in rest.places]
-        found[rest.laterals] = np.linalg.solve(rest.compliance, away)
-    return found
 
 
 def _check_palm(
@@ -332,7 +378,7 @@ def _check_palm(
             body.palm_friction,
             body.palm_own_friction,
         )
-    step = moved(hand.palm.centre, wrist)
+    step = moved(hand.palm.centre[None, None], wrist.twist[None])[0, 0]
 
     # the integral of a stiffness that rises from zero to its whole over the onset [m]
     def pressed(travel: float, onset: float) -> float:

@@ -8,18 +8,19 @@ from __future__ import annotations
 
 import cmath
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array
-from hand_models.finger import Contact, FingerModel
+from hand_models.finger import PHALANGES, Contact, FingerModel
+from hand_models.hand import FINGERS, SettledHand
 from hand_models.sections import Section
 
-__all__ = ["RestingContact", "TileFace"]
+__all__ = ["RestingContact", "TileFace", "finger_contacts"]
 
-PRESSURE_NODES, PRESSURE_WEIGHTS = np.polynomial.legendre.leggauss(3)
-"""Gauss-Legendre quadrature that integrates a tile's parabolic pressure exactly."""
+PRESSURE_NODES = np.transpose(np.polynomial.legendre.leggauss(3)).tolist()
+"""Nodes and weights of Gauss-Legendre quadrature, exact for a tile's parabolic pressure."""
 
 
 class TileFace(NamedTuple):
@@ -32,8 +33,8 @@ class TileFace(NamedTuple):
         [m].
     near, far : float
         Positions along the face at which it begins and ends [m].
-    way : ndarray, shape (2,)
-        Unit vector along the face at rest, in the finger's plane (x, z).
+    way : complex
+        Unit vector along the face at rest, x + i z of the finger's plane.
     depth : float
         Depth to which the face is pressed in [m].
     lies : bool
@@ -44,7 +45,7 @@ class TileFace(NamedTuple):
     height: float
     near: float
     far: float
-    way: Array
+    way: complex
     depth: float
     lies: bool
 
@@ -55,7 +56,7 @@ class TileFace(NamedTuple):
         arm = complex(contact.along, model.tile_height + contact.rise)
         arm *= cmath.rect(1.0, -contact.tilt)
         near, far = (arm.real + each - contact.along for each in model.tile_range)
-        axis = np.array([math.cos(way), math.sin(way)])
+        axis = cmath.rect(1.0, way)
         return cls(arm.real, arm.imag, near, far, axis, depth, contact.kind == "face")
 
     def bears(self, touches: float, radius: float) -> float:
@@ -72,9 +73,12 @@ class TileFace(NamedTuple):
         start, end = max(self.near, touches - widest), min(self.far, touches + widest)
         if not start < end:
             return touches
-        places = (start + end) / 2.0 + (end - start) / 2.0 * PRESSURE_NODES
-        pressures = PRESSURE_WEIGHTS * (self.depth - (places - touches) ** 2 / (2.0 * radius))
-        return float(pressures @ places / pressures.sum())
+        middle, half, pressed, moment = (start + end) / 2.0, (end - start) / 2.0, 0.0, 0.0
+        for node, weight in PRESSURE_NODES:
+            place = middle + half * node
+            pressure = weight * (self.depth - (place - touches) ** 2 / (2.0 * radius))
+            pressed, moment = pressed + pressure, moment + pressure * place
+        return moment / pressed
 
 
 class RestingContact(NamedTuple):
@@ -89,9 +93,9 @@ class RestingContact(NamedTuple):
     radius : float or None
         Radius of the rock at the contact [m]; infinite where it is flat, None where it is neither a
         circle nor a line.
-    point : ndarray, shape (2,)
-        Point from which the way along the rock counts, in the finger's plane (x, z) [m].
-    normal : ndarray, shape (2,)
+    point : complex
+        Point from which the way along the rock counts, x + i z of the finger's plane [m].
+    normal : complex
         Outward normal of the rock there.
     gap : float
         Distance of the point from the rock [m].
@@ -104,15 +108,15 @@ class RestingContact(NamedTuple):
     section: Section
     face: TileFace
     radius: float | None
-    point: Array
-    normal: Array
+    point: complex
+    normal: complex
     gap: float
     touches: float
     bears: float | None
 
     @classmethod
-    def of(cls, section: Section, face: TileFace, point: Array) -> RestingContact:
-        """Return the contact of a face that touches at a point (2,) of the finger's plane [m]."""
+    def of(cls, section: Section, face: TileFace, point: complex) -> RestingContact:
+        """Return the contact of a face that touches at x + i z of the finger's plane [m]."""
         radius, touches, bears = _radius(section, point), face.along, None
         # from a radius of 10 m on the model lets faces slide as on a flat
         if radius is not None and face.lies and radius < 10.0:
@@ -120,10 +124,10 @@ class RestingContact(NamedTuple):
             if face.near <= beside <= face.far:
                 touches, bears = beside, face.bears(beside, radius)
         start = point + (touches - face.along) * face.way
-        gap = _clearance(section, start)
+        gap = section.distance(start)
         return cls(section, face, radius, start, _normal(section, start), gap, touches, bears)
 
-    def slip(self, point: Array, along: float, way: Array) -> tuple[float | None, float]:
+    def slip(self, point: complex, along: float, way: complex) -> tuple[float | None, float]:
         """Return the slip of the tile on the rock, and the error of its reported contact [m].
 
         A rolling face slips by the travel of the contact along the face minus its travel along the
@@ -131,11 +135,11 @@ class RestingContact(NamedTuple):
 
         Parameters
         ----------
-        point : ndarray, shape (2,)
-            Contact point after the motion, in the finger's plane (x, z) [m].
+        point : complex
+            Contact point after the motion, x + i z of the finger's plane [m].
         along : float
             Position of that point along the phalanx [m].
-        way : ndarray, shape (2,)
+        way : complex
             Unit vector along the face after the motion.
 
         Returns
@@ -158,50 +162,68 @@ class RestingContact(NamedTuple):
         arc = self._arc(point + (touches - along) * way, way, face.way)
         return touches - self.touches - arc, off - went
 
-    def _arc(self, after: Array, u: Array, lies: Array | None) -> float:
+    def _arc(self, after: complex, u: complex, lies: complex | None) -> float:
         """Return how far the contact went along the rock, positive away from the base [m].
 
         From the chord and the turn of the rock's normal, as on a circle. ``lies``: along a face
         that touches at rest, which on a flat is the rock's own way but for the search's tolerance.
         """
         first, last = self.normal, _normal(self.section, after)
-        turn = math.atan2(first[0] * last[1] - first[1] * last[0], float(first @ last))
-        middle = first + last
-        tangent = np.array([-middle[1], middle[0]]) / math.hypot(*middle)
+        turn, middle = cmath.phase(last * first.conjugate()), first + last
+        tangent = 1j * middle / abs(middle)
         straight = 1e-12  # [rad] turn of the normal of flat rock
         if lies is not None and abs(turn) < straight:
             tangent = lies
-        sign = math.copysign(1.0, float(tangent @ u))
-        chord = float((after - self.point) @ tangent)
+        sign = math.copysign(1.0, _dot(tangent, u))
+        chord = _dot(after - self.point, tangent)
         path = chord if abs(turn) < straight else chord * (turn / 2.0) / math.sin(turn / 2.0)
         return sign * (path - self.gap * turn)
 
 
-def _normal(section: Section, point: Array) -> Array:
-    return np.array(section.normal((float(point[0]), float(point[1]))))
+@lru_cache(maxsize=256)  # the fingers of as many hands as the check keeps stances
+def finger_contacts(
+    hand: SettledHand, index: int
+) -> tuple[tuple[TileFace, ...], tuple[RestingContact | None, ...]]:
+    """Return the faces of a finger's tiles, and their contacts with the rock."""
+    settled, model = hand.fingers[index], hand.fingers[index].model
+    own = np.flatnonzero(hand.finger_of == index)
+    section = hand.hand.section(FINGERS[index], hand.hold, hand.grasp, hand.seating.pose)
+    depths = model.depths(len(own) > len(PHALANGES)) * hand.closing_tension
+    faces, contacts = [], list[RestingContact | None]()
+    for contact, depth in zip(settled.contacts, depths, strict=True):
+        faces.append(face := TileFace.of(contact, model, float(depth)))
+        at = complex(*contact.point(model.tile_height))
+        if section is None or contact.kind not in ("face", "edge"):
+            contacts.append(None)
+        else:
+            contacts.append(RestingContact.of(section, face, at))
+    return tuple(faces), tuple(contacts)
 
 
-def _beside(section: Section, radius: float, point: Array, way: Array) -> float:
+def _dot(a: complex, b: complex) -> float:
+    return a.real * b.real + a.imag * b.imag
+
+
+def _normal(section: Section, point: complex) -> complex:
+    return complex(*section.normal((point.real, point.imag)))
+
+
+def _beside(section: Section, radius: float, point: complex, way: complex) -> float:
     """Return how far along a line through a point it is nearest to a circle [m]."""
-    out = _normal(section, point)
-    return -(radius + _clearance(section, point)) * float(out @ way)
+    return -(radius + section.distance(point)) * _dot(_normal(section, point), way)
 
 
-def _clearance(section: Section, point: Array) -> float:
-    return section.clearance((float(point[0]), float(point[1])))
-
-
-def _radius(section: Section, point: Array) -> float | None:
+def _radius(section: Section, point: complex) -> float | None:
     """Return the radius of a section that is a circle about a place, or a line: infinite [m].
 
     Beside a circle of radius R a point at e along its tangent is √(R² + e²) − R away from it. None
     where the rock is neither: the model takes it as one, which only the model knows.
     """
     out = _normal(section, point)
-    foot, aside = point - _clearance(section, point) * out, np.array([-out[1], out[0]])
+    foot, aside = point - section.distance(point) * out, 1j * out
     beside = 4e-3  # [m] from the contact, and twice that, the rock is looked at
-    near = [_clearance(section, foot + side * beside * aside) for side in (1.0, -1.0)]
-    far = [_clearance(section, foot + 2.0 * side * beside * aside) for side in (1.0, -1.0)]
+    near = [section.distance(foot + side * beside * aside) for side in (1.0, -1.0)]
+    far = [section.distance(foot + 2.0 * side * beside * aside) for side in (1.0, -1.0)]
     away = 0.5 * sum(near)
     if away < 0.0:
         return None
