@@ -148,10 +148,12 @@ class BoundedStore(Generic[Question, Answer]):
 
     def keep(self, answers: Iterable[tuple[Question, Answer]]) -> None:
         """Add pairs (question, answer), and drop the least recently used ones beyond the bounds."""
+        added = dict(answers)
         with self._lock:
-            for question, answer in answers:
-                self._answers[question] = answer
-            while len(self._answers) > self.most or self._too_large():
+            self._answers |= added
+            # what has no size leaves the total as it was
+            grows = self._size is not None and self._size(added.values()) > 0.0
+            while len(self._answers) > self.most or (grows and self._too_large()):
                 self._answers.popitem(last=False)
 
     def _too_large(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from enum import Enum
 from functools import partial
@@ -228,33 +228,32 @@ def _check(value: object) -> None:
     UnsupportedError
         If a field has a value that this version does not support.
     """
-    # most parts first: there are hundreds
-    if value is None or isinstance(value, (str, int)):
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise InvalidInputError(f"must be a finite number, got {value}")
         return
-    if isinstance(value, float) and not math.isfinite(value):
-        raise InvalidInputError(f"must be a finite number, got {value}")
-    for name, part in _parts(value):
+    names: Sequence[object] | None = None
+    parts: Iterable[object] = ()
+    if isinstance(value, msgspec.Struct):
+        # a mesh's model checks its long lists of numbers as arrays
+        fields = [name for name in value.__struct_fields__ if name not in ("vertices", "faces")]
+        names, parts = fields, [getattr(value, name) for name in fields]
+        for name in LATER_FIELDS.keys() & fields:
+            if getattr(value, name) is not None:
+                error = UnsupportedError(f"not supported in this version; {LATER_FIELDS[name]}")
+                raise error.within(name)
+    elif isinstance(value, (list, tuple)):
+        parts = value
+    elif isinstance(value, Mapping):
+        names, parts = list(value), value.values()
+    for i, part in enumerate(parts):
+        # most parts: there are hundreds
+        if part is None or isinstance(part, (str, int)):
+            continue
         try:
-            if part is not None and name in LATER_FIELDS and isinstance(value, msgspec.Struct):
-                raise UnsupportedError(f"not supported in this version; {LATER_FIELDS[name]}")
             _check(part)
         except InvalidInputError as error:
-            raise error.within(name) from None
-
-
-def _parts(value: object) -> Iterator[tuple[str, object]]:
-    """Yield the parts of a struct, a mapping or a list, with their places in it."""
-    if isinstance(value, msgspec.Struct):
-        for name in value.__struct_fields__:
-            # a mesh's model checks its long lists of numbers as arrays
-            if name not in {"vertices", "faces"}:
-                yield name, getattr(value, name)
-    elif isinstance(value, (list, tuple)):
-        for i, part in enumerate(value):
-            yield f"[{i}]", part
-    elif isinstance(value, Mapping):
-        for key, part in value.items():
-            yield str(key), part
+            raise error.within(f"[{i}]" if names is None else str(names[i])) from None
 
 
 def _plain(payload: bytes, form: Format) -> Any:
