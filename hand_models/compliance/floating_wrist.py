@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Final, Literal, Self
 
 import numpy as np
@@ -183,6 +184,12 @@ class FloatingWrist(CompliantGrasp):
         """
         return self.hand.loads(y)
 
+    @cached_property
+    def _contact_stiffness(self) -> Array:
+        """Contact stiffness of each tile, zero off the rock, shape (n,) [N/m]."""
+        fingers = self.hand.fingers
+        return np.concatenate([finger.anchored.contact_stiffness for finger in fingers])
+
     def stretches(self, shears: Array) -> Array:
         """Return how far tiles are stretched along the rock: shear over contact stiffness [m].
 
@@ -196,9 +203,7 @@ class FloatingWrist(CompliantGrasp):
         ndarray, shape (n,)
             Zero for tiles off the rock.
         """
-        stiffness = np.concatenate(
-            [finger.anchored.contact_stiffness for finger in self.hand.fingers]
-        )
+        stiffness = self._contact_stiffness
         held, found = stiffness > 0.0, np.zeros(len(stiffness))
         found[held] = np.abs(shears[held]) / stiffness[held]
         return found

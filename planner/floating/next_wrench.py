@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Literal
 
 from planner import programs
 from planner.deadline import Budget
@@ -65,8 +66,10 @@ def next_plan(hands: HandSets, near: WristSolution, budget: Budget) -> WristSolu
         budget.spend()
         most = gap(goal, now, outcome) if outcome.solved else math.inf
         if most <= SETTINGS.next_gap:
-            now = replace(now, found="unproven", outcome=outcome, rounds=rounds)
-            return replace(now, found="least") if most <= SETTINGS.closeness else now
+            found: Literal["least", "unproven"] = (
+                "least" if most <= SETTINGS.closeness else "unproven"
+            )
+            return replace(now, found=found, outcome=outcome, rounds=rounds)
     return None
 
 

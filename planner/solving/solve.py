@@ -319,7 +319,7 @@ class KnownStance:
         self._checks: Checks | None = None
         self._near: Solution | None = None
         # what joints bear changes with the wrench
-        if prepared.where is None and question.stance.joints is None and not prepared.floating:
+        if prepared.where is None and question.stance.joints is None:
             self._checks = prepare_checks(prepared)
 
     @property
