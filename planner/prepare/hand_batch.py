@@ -221,6 +221,12 @@ class HandBatch:
     bends: Array
     palm_limits: Array
 
+    @staticmethod
+    @lru_cache(maxsize=256)
+    def alone(hand: SettledHand) -> HandBatch:
+        """Return the arrays of one settled hand; those of the last 256 hands are kept."""
+        return HandBatch.of((hand,))
+
     @classmethod
     def of(cls, hands: Sequence[SettledHand]) -> HandBatch:
         """Collect the arrays of settled hands, one hand after another."""

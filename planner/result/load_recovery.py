@@ -308,13 +308,6 @@ def _drawn_tendons(known: HandBatch) -> tuple[Array, Array, Array]:
     return known.bends @ np.array(hand.finger.pulley_radii), losses, nails
 
 
-@lru_cache(maxsize=256)  # as many hands as a model keeps settled
-def _alone(settled: SettledHand) -> tuple[HandBatch, tuple[Array, Array, Array]]:
-    """Return a hand as a batch of its own, and what its winches draw in besides travel."""
-    known = HandBatch.of((settled,))
-    return known, _drawn_tendons(known)
-
-
 def recover_floating_hand(
     limb: str,
     settled: SettledHand,
@@ -357,10 +350,11 @@ def recover_floating_hand(
     rows, of_tiles = space.utilisations(y), layout_of(settled, sticking=False).plane_tiles
     used = np.zeros(len(loads))
     np.maximum.at(used, of_tiles, rows[: len(of_tiles)])
-    (known, (joints, losses, nails)), drive = _alone(settled), settled.hand.drive
+    known, drive = HandBatch.alone(settled), settled.hand.drive
     # the winch stands still from there on
     at_rest = settled.loads[:, 0, 0] + settled.loads[:, 0, 1] * closed[settled.finger_of]
     drawn = np.add.reduceat(at_rest, known.places.first_of_finger)
+    joints, losses, nails = _drawn_tendons(known)
     shear, pressing = found.palm[0]
     palm = Palm(
         position=settled.palm.centre,
