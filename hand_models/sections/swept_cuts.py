@@ -81,8 +81,9 @@ def entry_distances(shape: Swept, points: ArrayLike, directions: ArrayLike) -> A
         Distance from each point, in metres of the hold's frame. Negative if the rock begins behind
         the point, as for a point inside the rock; infinite if the ray's line misses the rock.
     """
-    x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
-    dx, dy, dz = np.moveaxis(np.asarray(directions, dtype=float), -1, 0)
+    places, ways = np.asarray(points, dtype=float), np.asarray(directions, dtype=float)
+    x, y, z = places[..., 0], places[..., 1], places[..., 2]
+    dx, dy, dz = ways[..., 0], ways[..., 1], ways[..., 2]
     a, b = dx * dx + dy * dy + dz * dz, x * dx + y * dy + z * dz
     radius = shape.radius
     discriminant = b * b - a * (x * x + y * y + z * z - radius * radius)
