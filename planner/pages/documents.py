@@ -51,6 +51,7 @@ def document(title: str, data: dict[str, Any]) -> str:
         "plotly": packed,
         "data": text.replace("<", "\\u003c"),
         "script": _part("page.js")
+        + _part("labels.js")
         + (_part("live.js") if "live" in data else "\nstart().catch(unable);\n"),
     }
     page = _part("page.html")

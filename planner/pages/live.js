@@ -15,17 +15,6 @@ async function ask(path, question) {
   } catch { return { error: "crux view does not answer: it has ended; start it again", gone: true }; }
 }
 
-// where points are on the screen, as plotly's own texts find it
-function pixelOf(point) {
-  const { glplot, dataScale, container } = byId("scene")._fullLayout.scene._scene;
-  let at = [...point.map((c, k) => c * dataScale[k]), 1];
-  for (const name of ["model", "view", "projection"]) {
-    const m = glplot.cameraParams[name];
-    at = [0, 1, 2, 3].map((row) => m[row] * at[0] + m[4 + row] * at[1] + m[8 + row] * at[2] + m[12 + row] * at[3]);
-  }
-  return [0.5 * (1 + at[0] / at[3]) * container.clientWidth, 0.5 * (1 - at[1] / at[3]) * container.clientHeight];
-}
-
 function pixelsAlong(place, axis) { // on the screen, for a metre along an axis in W
   const [from, to] = [pixelOf(place), pixelOf(place.map((c, k) => c + 1e-3 * axis[k]))];
   return [0, 1].map((k) => 1e3 * (to[k] - from[k]));
@@ -277,7 +266,7 @@ async function followStreams() {
 }
 
 function begin() {
-  const around = made("div", "", "around"), handles = Object.assign(made("div"), { id: "handles" }), bar = made("div", "", "buttons");
+  const around = byId("scene").parentElement, handles = Object.assign(made("div"), { id: "handles" }), bar = made("div", "", "buttons");
   const button = (text, id, press) => bar.append(Object.assign(made("button", text), { id, onclick: press }));
   button("undo", "undo", undo);
   button("redo", "redo", redo);
@@ -292,8 +281,7 @@ function begin() {
   });
   const said = Object.assign(made("output", "drag a ring, with shift to turn it; or choose it, and press arrow keys, or R, P or Y"), { id: "said" });
   for (const each of bar.querySelectorAll("#undo, #redo")) each.disabled = true;
-  byId("scene").before(around);
-  around.append(byId("scene"), handles);
+  around.append(handles);
   const pressed = (event) => { if (event.buttons && (held || handles.contains(event.relatedTarget))) event.stopPropagation(); };
   for (const kind of ["mouseover", "mouseout", "mouseenter", "mouseleave"]) around.addEventListener(kind, pressed, true); // plotly would turn the camera, too
   around.after(said); // below: what it says must not move the scene under the mouse

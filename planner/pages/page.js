@@ -185,21 +185,14 @@ function bounds(spare = 0.05) { // of all stages and places, so that the view st
   return [0, 1, 2].map((k) => low[k] > high[k] ? [-1, 1] : [low[k] - spare, high[k] + spare]);
 }
 
-function annotationsOf(scene) { // texts over the scene: as meshes they take a second
-  const short = (text) => text.length > 30 ? `${text.slice(0, 29)}…` : text;
-  const said = (p, text, more) => ({ x: p[0], y: p[1], z: p[2], text: plain(short(text)), showarrow: false, font: { color: ink("ink"), size: 12 }, ...more });
-  const arrows = shownKinds["forces of hands"] ? scene.arrows : [];
-  return [...scene.labels.map((l) => said(l.place, l.text, { yshift: -14 })), ...arrows.map((a) => said(a.tip, a.text.split("\n")[0], { yshift: 12 })),
-    ...(chosen()?.moves ?? []).map((m) => said(middle(m.to ?? m.from), m.text, { yshift: -34, font: { color: ink("advice"), size: 13 }, bgcolor: ink("panel") }))];
-}
-
 function drawScene(view) {
   const scene = data.stages[at].scene;
   const axes = Object.fromEntries(["x", "y", "z"].map((c, k) => [`${c}axis`, { ...axis(`${c} of ${data.frame ?? "W"} [m]`), range: ranges[k], nticks: 4 }]));
   const layout = { margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: ink("back"), showlegend: false, uirevision: "kept",
     hoverlabel: { align: "left" }, scene: { ...axes, domain: { y: [data.groups?.some((g) => g.values) ? 0.12 : 0, 1] }, // above the bar of colours
-      aspectmode: "data", dragmode: "turntable", annotations: scene ? annotationsOf(scene) : [] } };
+      aspectmode: "data", dragmode: "turntable" } };
   layout.scene.camera = camera = view ? cameraOf(view) : keptCamera();
+  drawLabels(scene);
   return Plotly.react(byId("scene"), scene ? sceneTraces(scene) : [], layout, config);
 }
 
@@ -280,6 +273,12 @@ function drawTable(table, place) {
   place.replaceChildren(shown);
 }
 
+function titled(level, table) {
+  const place = made("div", "", "table");
+  drawTable(table, place);
+  return [made(level, table.title), place];
+}
+
 function listed(title, lines) {
   const list = made("ul");
   lines.forEach((line) => list.append(made("li", line)));
@@ -288,7 +287,6 @@ function listed(title, lines) {
 
 function listedAdvice(advice) {
   listed("Advice: changes that were planned and verified", advice.map((a) => `${a.holds ? "holds" : "less overloaded"}, utilisation ${fixed(a.utilisation, 3)}: ${a.sentence} `));
-  const place = made("div", "", "table");
   advice.forEach((a, n) => {
     if (!a.moves) return;
     const button = made("button", drawnAdvice === n ? "hide" : "draw");
@@ -300,7 +298,7 @@ function listedAdvice(advice) {
     };
     byId("notes").querySelectorAll("li")[n].append(button);
   });
-  if (chosen()?.table) { drawTable(chosen().table, place); byId("notes").append(made("h2", chosen().table.title), place); }
+  if (chosen()?.table) byId("notes").append(...titled("h3", chosen().table));
 }
 
 function showOutcome(stage) {
@@ -312,7 +310,7 @@ function showOutcome(stage) {
   if (Number.isFinite(stage.load_factor)) parts.push(`load factor ${fixed(stage.load_factor, 2)}${within("load_factor")}`);
   else if (stage.load_factor_status === "unbounded") parts.push("load factor unbounded");
   byId("outcome").replaceChildren(made("span", stage.status, `status ${stage.status}`), parts.join(", "));
-  byId("sentence").textContent = stage.sentence;
+  byId("sentence").textContent = [stage.sentence, stage.tied].filter(Boolean).join("; ");
 }
 
 function showWords(stage) {
@@ -320,13 +318,10 @@ function showWords(stage) {
   byId("notes").replaceChildren();
   if (stage.advice?.length) listedAdvice(stage.advice);
   else if (stage.advice) listed("Advice", ["no change that was tried helps"]);
-  if (stage.sure?.length) listed("How sure", stage.sure);
+  if (stage.sure?.length || stage.samples) listed("How sure", stage.sure ?? []);
+  if (stage.samples) byId("notes").append(...titled("h3", stage.samples));
   if (stage.warnings?.length) listed("Warnings", stage.warnings);
-  byId("tables").replaceChildren(...(stage.tables ?? []).flatMap((table) => {
-    const place = made("div", "", "table");
-    drawTable(table, place);
-    return [made("h2", table.title), place];
-  }));
+  byId("tables").replaceChildren(...(stage.tables ?? []).flatMap((table) => titled("h2", table)));
 }
 
 // Together ---------------------------------------------------------------------------------------
@@ -376,6 +371,7 @@ async function start() {
     byId("after").onclick = () => go(at + 1);
   }
   await show(Object.values(views)[0]);
+  placeLabels();
   if (data.stages.length > 1) byId("margin").on("plotly_click", (event) => go(event.points[0].x));
   dark.addEventListener("change", () => show());
 }

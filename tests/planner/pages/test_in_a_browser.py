@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import math
 import re
-import shutil
 import subprocess
 from base64 import b64decode
 from dataclasses import replace
 from html import unescape
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -22,10 +22,10 @@ from planner.result import Advice
 from service.answering import route_of
 from service.commands.cli import run_command_line
 from service.commands.stances import read_route
+from tests.suite.helpers.browser import PROGRAM as BROWSER, Browser
 from tests.suite.helpers.commands import DONE, result
 from tests.suite.helpers.pictures import answered
 
-BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 HEADLESS = [
     "--headless", "--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader",
     "--window-size=1280,900", "--enable-logging=stderr", "--v=0", "--virtual-time-budget=30000",
@@ -177,3 +177,66 @@ def test_a_climb_is_drawn_stage_by_stage(tmp_path):
     assert seen["second"].startswith(f"stage 1 of {count - 1}: 1 ")
     assert seen["bars"] == count
     assert seen["drawn"]
+
+
+LABELS = """[...document.querySelectorAll("#labels .label")].map((each) => ({
+  text: each.textContent, title: each.title, folded: each.classList.contains("folded"),
+  box: each.getBoundingClientRect().toJSON() }))"""
+
+CROWD = """
+  drawnAdvice = null;
+  const { labels: all } = data.stages[0].scene, { place } = all[0];
+  for (let n = 0; n < 150; n++) all.push({ place: place.map((c) => c + 1e-3 * n), text: `${n}th` });
+  show()"""
+
+
+def overlaps(labels):
+    """Pairs of the texts of labels whose boxes have more in common than the rounding of places."""
+    pairs = combinations([each for each in labels if not each["folded"]], 2)
+    sides = ("left", "right"), ("top", "bottom")
+    return [
+        (one["text"], other["text"])
+        for one, other in pairs
+        if all(
+            min(one["box"][high], other["box"][high]) - max(one["box"][low], other["box"][low])
+            > 0.2
+            for low, high in sides
+        )
+    ]
+
+
+@pytest.mark.parametrize(("width", "dark"), [(1280, False), (390, True)])
+def test_labels_never_lie_on_each_other_and_important_ones_stay(tmp_path, width, dark):
+    question, plan = answered("solved")
+    body = replace(question.stance.body, position=question.stance.body.position + 0.02)
+    changes = {"stance.body": pose_message(body)}
+    advice = Advice("body", [], "shift", changes, 1.0, "optimal", math.nan, None, True)
+    file = tmp_path / "plan.html"
+    write_plan_page(replace(plan, advice=(advice,)), question, file, "a wall")
+    limbs = {hand.limb.replace("_", " ") for hand in plan.hands}
+    with Browser(tmp_path / "profile", width) as browser:
+        browser.resize(width, 900, dark=dark)
+        browser.open(file.as_uri())
+        placed = "placedFor && labels.every((each) => each.element.style.transform)"
+        for press in ("views button:nth-child(2)", "views button:nth-child(3)", "notes li button"):
+            browser.run(f"document.querySelector('#{press}').click()")
+            browser.until("drawnAdvice === 0" if "notes" in press else "!drawnAdvice")
+            browser.until(placed)
+            found = browser.run(LABELS)
+            assert overlaps(found) == []
+            shown = {each["text"].split("\n")[0] for each in found if not each["folded"]}
+            assert shown >= limbs | {"B"}
+        scene = browser.run("byId('scene').getBoundingClientRect().toJSON()")
+        for each in found:
+            assert scene["left"] <= each["box"]["left"]
+            assert each["box"]["right"] <= scene["right"]
+        # a crowd: those of hands that carry stay, the others say on hover what they are
+        browser.run(CROWD)
+        browser.until(placed)
+        found = browser.run(LABELS)
+        folded = [each for each in found if each["folded"]]
+        assert folded
+        assert all(each["title"] == each["text"] for each in folded)
+        assert not limbs & {each["text"].split("\n")[0] for each in folded}
+        assert overlaps(found) == []
+        assert browser.errors == []
