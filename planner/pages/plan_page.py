@@ -9,9 +9,10 @@ from typing import Any
 from hand_models.base import CruxError
 from planner.pages.advice_data import advice_data
 from planner.pages.documents import write_document
-from planner.pages.plan_rows import plan_tables
+from planner.pages.plan_rows import plan_tables, sample_table
 from planner.pages.scenes import Meshes, scene_data
 from planner.pages.wrench_slices import wrench_slice
+from planner.pictures import PICTURE_SETTINGS, joint_utilisations
 from planner.question import Question
 from planner.result import HandPlan, Plan, Quantiles
 
@@ -66,6 +67,7 @@ def shown_plan(
     found = {
         "status": plan.status,
         "sentence": plan.reason,
+        "tied": _tied(plan, question),
         "utilisation": plan.utilisation,
         "limit": cap,
         "load_factor": plan.load_factor,
@@ -75,13 +77,14 @@ def shown_plan(
     }
     if brief:
         return found
-    spread = plan.spread
+    spread, samples = plan.spread, sample_table(plan)
     return found | {
         "spread": spread
         and {
             "utilisation": _ends(spread.utilisation),
             "load_factor": _ends(spread.load_factor),
         },
+        "samples": samples and samples._asdict(),
         "slices": [_slice(hand) for hand in plan.hands or ()],
         "tables": [each._asdict() for each in plan_tables(plan, question)],
         "advice": advice_data(plan, question),
@@ -91,6 +94,29 @@ def shown_plan(
 def _ends(quantiles: Quantiles | None) -> list[float] | None:
     """Return the ends of an interval over samples; None without one."""
     return None if quantiles is None else [quantiles.low, quantiles.high]
+
+
+def _tied(plan: Plan, question: Question) -> str:
+    """Return in words which hands, and joints of limbs, tie for the largest utilisation, if any."""
+    used = {hand.limb: hand.utilisation for hand in plan.hands or ()}
+    bent = {limb: max(each) for limb, each in joint_utilisations(plan, question.stance).items()}
+    part = PICTURE_SETTINGS.tie
+    least = (1.0 - part) * max([*used.values(), *bent.values()], default=0.0)
+    hands, joints = ([limb for limb in each if each[limb] >= least] for each in (used, bent))
+    if len(hands) + len(joints) < 2:
+        return ""
+    counts = {2: "both", 3: "all three", 4: "all four"}
+    said = [_listed(hands)] * bool(hands)
+    if len(hands) == len(used) > 1:
+        said = [f"{counts.get(len(hands), 'all')} hands"]
+    if joints:
+        said.append(f"joints of {_listed(joints)}")
+    return f"{' and '.join(said)} tie for the largest utilisation, within {100.0 * part:g} %"
+
+
+def _listed(limbs: Sequence[str]) -> str:
+    *first, last = (limb.replace("_", " ") for limb in limbs)
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _slice(hand: HandPlan) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from planner.pictures import joint_utilisations
 from planner.question import Question
 from planner.result import LimitName, Plan
 
-__all__ = ["PageTable", "plan_tables"]
+__all__ = ["PageTable", "plan_tables", "sample_table"]
 
 
 class PageTable(NamedTuple):
@@ -82,11 +82,6 @@ def plan_tables(plan: Plan, question: Question) -> list[PageTable]:
         ("What a unit more of a limit takes off the utilisation", "limb,part,limit,price,unit",
          prices),
         ("In the way of a balance", "limb,part,limit,constraint", barriers),
-        (
-            "Samples of what is not known of hand and rock",
-            "tensions,feasible,overloaded,no balance,utilisation from,utilisation to",
-            list(_samples(plan)),
-        ),
     ]  # fmt: skip
     return [PageTable(*table) for table in tables if table[2]]
 
@@ -102,15 +97,24 @@ def _joints(plan: Plan, question: Question) -> Iterator[list[Any]]:
             yield [_said(limb), i, *numbers]
 
 
-def _samples(plan: Plan) -> Iterator[list[Any]]:
-    """Yield how many samples hold, planned anew and with what is done with this plan."""
+def sample_table(plan: Plan) -> PageTable | None:
+    """Return how many samples hold, planned anew and with what is done with this plan, if any.
+
+    Parameters
+    ----------
+    plan : Plan
+        With or without a spread.
+    """
     spread = plan.spread
     if spread is None:
-        return
+        return None
+    rows: list[list[Any]] = []
     for words, each in spread.answers.items():
         counts = each.holds, spread.draws - each.holds - each.without, each.without
         used = each.utilisation
-        yield [words, *counts, *((None, None) if used is None else (used.low, used.high))]
+        rows.append([words, *counts, *((None, None) if used is None else (used.low, used.high))])
+    columns = "tensions,feasible,overloaded,no balance,utilisation from,utilisation to"
+    return PageTable("Samples of what is not known of hand and rock", columns, rows)
 
 
 def _owned(name: LimitName) -> list[str]:

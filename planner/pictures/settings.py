@@ -26,6 +26,9 @@ class PictureSettings:
     dark_overload: str = "#d9b3ff"
     """Colours of utilisations, evenly spaced from 0 to 1, and of those above 1:
     the more, the darker. ``dark_overload`` takes the place of the last on a dark page."""
+    tie: float = 0.01
+    """Part of the largest utilisation by which others that count as tied may be less: it is said
+    with two digits, and no capacity is known better."""
     longest_force: float = 32.0
     """Length of the arrow of the largest tile force [mm]."""
     note_padding: float = 1.0

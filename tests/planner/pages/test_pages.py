@@ -31,7 +31,8 @@ from planner.pages import (
     write_plan_page,
     write_route_page,
 )
-from planner.pictures import drawn_scene
+from planner.pages.plan_page import shown_plan
+from planner.pictures import drawn_scene, joint_utilisations
 from planner.result import Advice
 from planner.robots import RobotFile, robot_of
 from planner.solving import solve
@@ -134,6 +135,33 @@ def test_tables_have_the_plans_numbers():
     torques = [row[4] for row in tables["Joints, from the body outward"]["rows"]]
     limbs = (plan.joint_torque[limb].tolist() for limb in plan.joints)
     assert torques == [torque for limb in limbs for torque in limb]
+
+
+@pytest.mark.parametrize(
+    ("used", "said"),
+    [
+        ([0.9, 0.9, 0.9, 0.9], "all four hands"),
+        ([0.8, 0.892, 0.9, 0.89], "rear right and rear left"),
+        ([0.9, 0.892, 0.895, 0.8], "front right, rear right and rear left"),
+        ([0.9, 0.89, 0.8, 0.8], None),
+    ],
+)
+def test_all_hands_that_tie_for_the_largest_utilisation_are_named(used, said):
+    question, plan = answered("plain")
+    pairs = zip(plan.hands, used, strict=True)
+    hands = tuple(replace(hand, utilisation=each) for hand, each in pairs)
+    stage = shown_plan(replace(plan, hands=hands), question, Meshes(), brief=True)
+    tie = " tie for the largest utilisation, within 1 %"
+    assert stage["tied"] == ("" if said is None else said + tie)
+
+
+def test_joints_that_tie_with_hands_are_named_too():
+    question, plan = answered("solved")
+    joints = {limb: max(each) for limb, each in joint_utilisations(plan, question.stance).items()}
+    worst = max(joints, key=joints.__getitem__)
+    hands = [replace(hand, utilisation=0.995 * joints[worst]) for hand in plan.hands]
+    stage = shown_plan(replace(plan, hands=hands), question, Meshes(), brief=True)
+    assert stage["tied"].startswith(f"all four hands and joints of {worst.replace('_', ' ')}")
 
 
 def test_without_balance_a_page_says_what_is_in_the_way():
