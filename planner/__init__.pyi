@@ -172,6 +172,7 @@ from .solving import (
     PalmLoadFactors as PalmLoadFactors,
     load_factors_without_palm_loads as load_factors_without_palm_loads,
     plan as plan,
+    plan_without_palms as plan_without_palms,
     with_advice as with_advice,
 )
 from .streaming import (

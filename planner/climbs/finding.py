@@ -20,7 +20,7 @@ from planner.climbs.postures import PostureChoice, Postures, Swung
 from planner.climbs.raising import raises
 from planner.climbs.routing import ClimbStep, RouteMaker
 from planner.deadline import DeadlineError
-from planner.question import Limits, Objective
+from planner.question import Limits, Objective, Question
 from planner.route import (
     Climb,
     ClimbSettings,
@@ -312,7 +312,7 @@ class _Finder:
         begun = time.perf_counter()
         self._report("changes")
         deciding, state = _deciding(best, wall)
-        changes: tuple[Raise, ...] = ()
+        changes: tuple[tuple[Raise, Question], ...] = ()
         if deciding is not None and not deadline.expired():
             stage = best.result.stages[deciding.stage].question
             changes = raises(wall, state, stage, deciding.load_factor)
@@ -327,7 +327,8 @@ class _Finder:
             climb=best.climb,
             result=best.result,
             deciding=deciding,
-            raises=changes,
+            raises=tuple(change for change, _ in changes),
+            raised=tuple(asked for _, asked in changes),
             refused=refused,
             seconds=dict(self._seconds),
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from planner.climbs.outcome import ClimbStatus, DecidingStage, Raise, RefusedMoves
+from planner.question import Question
 from planner.route import Climb, Route, RouteResult
 from planner.search import Found, Wall
 
@@ -34,6 +35,8 @@ class FoundClimb:
     deciding : DecidingStage or None
     raises : tuple of Raise
         Changes that raise the load factor of the deciding stage, the best first.
+    raised : tuple of Question
+        The deciding stage with each of these changes.
     refused : tuple of RefusedMoves
         Moves of found states that have no plan, by kind.
     seconds : dict of str to float
@@ -50,6 +53,7 @@ class FoundClimb:
     result: RouteResult | None = None
     deciding: DecidingStage | None = None
     raises: tuple[Raise, ...] = ()
+    raised: tuple[Question, ...] = ()
     refused: tuple[RefusedMoves, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
 

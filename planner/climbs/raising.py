@@ -19,8 +19,8 @@ __all__ = ["raises"]
 
 def raises(
     wall: Wall, state: State, stage: Question, factor: float, part: float = 0.1
-) -> tuple[Raise, ...]:
-    """Return changes of a stage that raise its load factor, the best first.
+) -> tuple[tuple[Raise, Question], ...]:
+    """Return changes of a stage that raise its load factor, the best first, and what is then asked.
 
     Parameters
     ----------
@@ -32,8 +32,13 @@ def raises(
         Its load factor.
     part : float
         By which the rock under a hand is to be stronger, or the mass less.
+
+    Returns
+    -------
+    tuple of (Raise, Question)
+        With another placement the joints are to be found.
     """
-    found = list[Raise]()
+    found = list[tuple[Raise, Question]]()
     for i, hand in enumerate(stage.stance.hands):
         hands = list(stage.stance.hands)
         hands[i] = replace(hand, surface=hand.surface.times(1.0 + part))
@@ -44,23 +49,29 @@ def raises(
     load = structs.replace(stage.load, mass=(1.0 - part) * mass)
     words = f"{part * mass:.1f} kg less mass"
     found += _planned("mass", None, words, replace(stage, load=load))
-    found += _elsewhere(wall, state)
-    better = [each for each in found if each.load_factor > factor * (1.0 + 1e-6)]
-    return tuple(sorted(better, key=lambda each: -each.load_factor))
+    found += _elsewhere(wall, state, stage)
+    better = [each for each in found if each[0].load_factor > factor * (1.0 + 1e-6)]
+    return tuple(sorted(better, key=lambda each: -each[0].load_factor))
 
 
-def _planned(kind: str, limb: str | None, words: str, question: Question) -> list[Raise]:
+def _planned(
+    kind: str, limb: str | None, words: str, question: Question
+) -> list[tuple[Raise, Question]]:
     try:
         factor = plan(question).load_factor
     except InvalidInputError:
         # a hand may close otherwise on stronger rock, and not at all
         return []
-    return [] if factor is None else [Raise(kind=kind, limb=limb, change=words, load_factor=factor)]
+    if factor is None:
+        return []
+    return [(Raise(kind=kind, limb=limb, change=words, load_factor=factor), question)]
 
 
-def _elsewhere(wall: Wall, state: State, most: int = 8) -> list[Raise]:
+def _elsewhere(
+    wall: Wall, state: State, stage: Question, most: int = 8
+) -> list[tuple[Raise, Question]]:
     """Return the best other placement of each hand, by linear programs of those that look best."""
-    found = list[Raise]()
+    found = list[tuple[Raise, Question]]()
     members = np.array(state.members)
     for limb, present in enumerate(state.members):
         others = np.delete(members, limb)
@@ -83,5 +94,9 @@ def _elsewhere(wall: Wall, state: State, most: int = 8) -> list[Raise]:
             name, place = wall.robot.limbs[limb], int(choices[order[k]])
             x, y, z = wall.places[place].pose.position
             words = f"{name} at placement {place} instead, at ({x:.2f}, {y:.2f}, {z:.2f}) m"
-            found.append(Raise(kind="place", limb=name, change=words, load_factor=factors[k]))
+            raised = Raise(kind="place", limb=name, change=words, load_factor=factors[k])
+            moved = replace(wall.places[place], limb=name)
+            hands = [moved if hand.limb == name else hand for hand in stage.stance.hands]
+            stance = replace(stage.stance, hands=tuple(hands), joints="solve")
+            found.append((raised, replace(stage, stance=stance)))
     return found

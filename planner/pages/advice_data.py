@@ -10,12 +10,13 @@ import numpy as np
 from hand_models.base import CruxError
 from planner import solving
 from planner.advice import changed
+from planner.climbs import FoundClimb
 from planner.pages.plan_rows import PageTable
 from planner.pictures import DrawnScene, drawn_scene
 from planner.question import Question
 from planner.result import Advice, HandPlan, Plan
 
-__all__ = ["advice_data"]
+__all__ = ["advice_data", "raise_data"]
 
 
 def advice_data(plan: Plan, question: Question) -> list[dict[str, Any]] | None:
@@ -40,22 +41,59 @@ def advice_data(plan: Plan, question: Question) -> list[dict[str, Any]] | None:
         return None
     return [
         {"sentence": each.sentence, "utilisation": each.utilisation, "holds": each.holds}
-        | _difference(plan, question, each)
+        | _changed(plan, question, each)
         for each in plan.advice
     ]
 
 
-def _difference(plan: Plan, question: Question, advice: Advice) -> dict[str, Any]:
-    """Return what an advice changes, from a plan of the changed question."""
+def raise_data(plan: Plan, question: Question, found: FoundClimb) -> list[dict[str, Any]]:
+    """Return what raises the load factor of the stage that decides a climb, as advice.
+
+    Changes of which no plan has a larger load factor are left out: that of another placement is
+    known without limits of joint torques.
+
+    Parameters
+    ----------
+    plan : Plan
+        Of the stage.
+    question : Question
+        Of the stage.
+    found : FoundClimb
+        Whose changes of the stage are planned.
+
+    Returns
+    -------
+    list of dict of str to object
+        As of `advice_data`, the largest load factor first.
+    """
+    shown = list[tuple[float, dict[str, Any]]]()
+    for change, after in zip(found.raises, found.raised, strict=True):
+        try:
+            planned = solving.plan(replace(after, deadline=None, explain=False))
+            more = _difference(plan, question, planned, after)
+        except CruxError:
+            continue
+        factor, used = planned.load_factor, planned.utilisation
+        if factor is not None and used is not None and factor > (plan.load_factor or 0.0):
+            words = f"load factor {factor:.3f} in this stage with {change.change}"
+            holds = used <= question.limits.utilisation
+            shown.append((factor, {"sentence": words, "utilisation": used, "holds": holds} | more))
+    return [each for _, each in sorted(shown, key=lambda each: -each[0])]
+
+
+def _changed(plan: Plan, question: Question, advice: Advice) -> dict[str, Any]:
+    """Return what an advice changes, from a plan of the changed question; nothing without one."""
     plain = replace(question, want=frozenset(), deadline=None, open_loop=None, explain=False)
     try:
         after = changed(plain, advice.changes)
-        planned = solving.plan(after)
-        scenes = [
-            drawn_scene(*each, 2, rock=False) for each in ((plan, question), (planned, after))
-        ]
+        return _difference(plan, question, solving.plan(after), after)
     except CruxError:
         return {}
+
+
+def _difference(plan: Plan, question: Question, planned: Plan, after: Question) -> dict[str, Any]:
+    """Return what is otherwise in a plan of a changed question."""
+    scenes = [drawn_scene(*each, 2, rock=False) for each in ((plan, question), (planned, after))]
     old, new = ({hand.limb: hand for hand in each.hands or ()} for each in (plan, planned))
     places = [_places(scene) for scene in scenes]
     moves = []

@@ -12,16 +12,24 @@ import numpy as np
 from hand_models.base import Pose
 from hand_models.rock import Mesh
 from planner.climbs import FoundClimb
+from planner.pages.advice_data import raise_data
 from planner.pages.documents import write_document
 from planner.pages.route_page import shown_stages
 from planner.pages.scenes import Meshes, rock_stage
 from planner.programs import WRENCH_UNIT
+from planner.result import Plan
 
 __all__ = ["write_climb_page"]
 
 
 def write_climb_page(
-    found: FoundClimb, rock: Mesh, rock_pose: Pose, path: Path, title: str, said: Sequence[str] = ()
+    found: FoundClimb,
+    rock: Mesh,
+    rock_pose: Pose,
+    path: Path,
+    title: str,
+    said: Sequence[str] = (),
+    sure: Sequence[str] = (),
 ) -> None:
     """Write a climb as a page: stages on the rock, what each placement carries, and the bound.
 
@@ -39,6 +47,8 @@ def write_climb_page(
         Title of the page.
     said : sequence of str, optional
         Sentences of the verdict.
+    sure : sequence of str, optional
+        Sentences that say how sure the plan of the stage that decides is.
 
     Raises
     ------
@@ -72,6 +82,10 @@ def write_climb_page(
         "bound": found.bound if bounded else None,
         "said": [*said, *meshes.said],
     }
-    if found.deciding is not None:
-        data["crux"] = found.deciding.stage
+    if found.deciding is not None and found.result is not None:
+        data["crux"] = k = found.deciding.stage
+        plan, stage = found.result.plans[k], found.result.stages[k]
+        assert isinstance(plan, Plan)  # with a load factor
+        more = {"sure": list(sure), "advice": raise_data(plan, stage.question, found)}
+        stages[k] = stages[k] | more
     write_document(title, data, path)

@@ -21,7 +21,7 @@ function drawLabels(scene) {
   for (const a of arrows) if (!named.some(([, arrow]) => arrow === a)) found.push({ place: a.tip, text: short(a.text.split("\n")[0]), weight: 0.8 });
   const before = new Map(labels.map((l) => [l.text, l.choice]));
   labels = found.sort((a, b) => b.weight - a.weight).map((l) => ({ ...l, choice: before.get(l.text), element: made("span", l.text, `label ${l.kind ?? ""}`) }));
-  free = scene ? [...scene.tiles.map((t) => t.start), ...scene.labels.map((l) => l.place), ...scene.arrows.flatMap((a) => [a.tip, middle([a.start, a.tip])])] : [];
+  free = scene ? [...scene.tiles.map((t) => t.start), ...scene.labels.map((l) => l.place), ...scene.arrows.flatMap((a) => [a.tip, middle([a.start, a.tip])]), ...(chosen()?.moves ?? []).flatMap((m) => m.to ?? [])] : [];
   byId("labels").replaceChildren(...labels.map((l) => l.element));
   for (const l of labels) l.size = ["Width", "Height"].map((side) => 1 + l.element[`offset${side}`]); // which rounds
   placedFor = "";

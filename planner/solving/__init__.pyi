@@ -11,6 +11,7 @@ from .objectives import (
 from .palm_parts import (
     PalmLoadFactors as PalmLoadFactors,
     load_factors_without_palm_loads as load_factors_without_palm_loads,
+    plan_without_palms as plan_without_palms,
 )
 from .robust_tensions import MaxRobust as MaxRobust
 from .solution import (

@@ -6,17 +6,20 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from msgspec import structs
 
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from hand_models.wrench_spaces import WrenchSpace
 from planner import deadline
 from planner.prepare import PreparedStance, prepare_stance
 from planner.programs import CAP_SLACK
-from planner.question import Question
+from planner.question import Question, Want
+from planner.result import Plan
 from planner.solving.fixed_wrists import most_of_fixed
+from planner.solving.solve import plan
 from planner.solving.verified import idle_joints
 
-__all__ = ["PalmLoadFactors", "load_factors_without_palm_loads"]
+__all__ = ["PalmLoadFactors", "load_factors_without_palm_loads", "plan_without_palms"]
 
 
 class PalmLoadFactors(NamedTuple):
@@ -32,6 +35,27 @@ class PalmLoadFactors(NamedTuple):
 
     without_shear: float | None
     without_pressing: float | None
+
+
+def plan_without_palms(question: Question) -> Plan:
+    """Return the plan, with its load factor, of a stance whose palms carry nothing.
+
+    Parameters
+    ----------
+    question : Question
+        Question whose stance is planned without palms; of its extras only the load factor is.
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline passes before a plan passes the checks or is proven infeasible.
+    """
+    stance = question.stance
+    hands = [replace(hand, grasp=structs.replace(hand.grasp, palm=False)) for hand in stance.hands]
+    bare = replace(stance, hands=tuple(hands))
+    want: frozenset[Want] = frozenset({"load_factor"})
+    plain = replace(question, want=want, draws=None, open_loop=None, explain=False)
+    return plan(replace(plain, stance=bare))
 
 
 def load_factors_without_palm_loads(question: Question) -> PalmLoadFactors | None:

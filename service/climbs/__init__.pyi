@@ -10,10 +10,15 @@ from .listing import (
     route_listing as route_listing,
 )
 from .naming import naming_options as naming_options, with_options as with_options
-from .pages import write_page as write_page
+from .pages import (
+    with_spread as with_spread,
+    write_page as write_page,
+    write_search_page as write_search_page,
+)
 from .seeking import seek as seek
 from .sources import Sources as Sources
 from .verdict import (
     print_verdict as print_verdict,
+    spread_of as spread_of,
     verdict_sentences as verdict_sentences,
 )

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planner import FoundClimb
-from service.tables import counted
+from planner import FoundClimb, Spread
+from service.tables import counted, spread_sentences
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["print_verdict", "verdict_sentences"]
+__all__ = ["print_verdict", "spread_of", "verdict_sentences"]
 
 
 def print_verdict(
@@ -30,11 +30,23 @@ def print_verdict(
     """
     for sentence in verdict_sentences(found, at_least):
         out.print(sentence, markup=False, highlight=False)
+    if (spread := spread_of(found)) is not None:
+        for sentence in spread_sentences(spread):
+            out.print(f"deciding stage: {sentence}", markup=False, highlight=False)
     for name, path in files.items():
         out.print(f"{name}: {path}", markup=False, highlight=False, soft_wrap=True)
 
 
-def verdict_sentences(found: FoundClimb, at_least: float | None) -> Iterator[str]:
+def spread_of(found: FoundClimb) -> Spread | None:
+    """Return the spread of the stage that decides, if it was planned over samples."""
+    if found.result is None or found.deciding is None:
+        return None
+    return found.result.plans[found.deciding.stage].spread
+
+
+def verdict_sentences(
+    found: FoundClimb, at_least: float | None, *, raises: bool = True
+) -> Iterator[str]:
     """Yield the sentences of a verdict.
 
     Parameters
@@ -42,6 +54,8 @@ def verdict_sentences(found: FoundClimb, at_least: float | None) -> Iterator[str
     found : FoundClimb
     at_least : float or None
         Load factor that was asked for.
+    raises : bool, optional
+        Whether to say what raises the load factor of the stage that decides.
     """
     asked = "" if at_least is None else f" with a load factor of {at_least:g}"
     yield {
@@ -69,7 +83,7 @@ def verdict_sentences(found: FoundClimb, at_least: float | None) -> Iterator[str
         limit = f"; {reason}" if reason else ""
         move = f"move {deciding.move}, " if deciding.move else ""
         yield f"stage {deciding.stage} decides ({move}{what}; {where}){limit}"
-    for each in found.raises[:3]:
+    for each in found.raises[: 3 * raises]:
         yield f"  {each.load_factor:.3f} in that stage with {each.change}"
     for kind in found.refused[:3]:
         which = kind.phase if kind.limb is None else f"{kind.phase} of {kind.limb}"

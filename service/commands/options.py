@@ -192,9 +192,9 @@ class Wanted(NamedTuple):
     limits.
     """
 
-    spread: bool
-    draws: list[requests.Draw] | None
-    unexplained: bool
+    spread: bool = False
+    draws: list[requests.Draw] | None = None
+    unexplained: bool = False
 
     def of(self, request: RequestT) -> RequestT:
         """Return a copy of a plan or route request with these options."""

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 from time import perf_counter
+from typing import TypeVar
 
 import click
 import msgspec
@@ -23,6 +25,8 @@ __all__ = [
     "redundancy_command",
     "schema_command",
 ]
+
+ResultT = TypeVar("ResultT")
 
 
 @click.command("plan")
@@ -99,8 +103,8 @@ def plan_command(
         with planner.deadline.within(request.deadline):
             answer = answering.planned(request, robots)
             full = request.detail in (None, "full") and not brief
-            bare = _without_palms(request, robots) if full else None
-            parts = _without_palm_loads(answer) if full else None
+            bare = _in_time(planner.plan_without_palms, answer) if full else None
+            parts = _in_time(planner.load_factors_without_palm_loads, answer) if full else None
         if picture is not None:
             tables.write_plan_picture(answer, picture)
     if not as_json:
@@ -242,7 +246,7 @@ def redundancy_command(stance: str, picture: Path | None, own: options.Own, as_j
 
 def _print(
     answer: answering.Planned,
-    without_palm: replies.PlanReply | None,
+    without_palm: planner.Plan | None,
     palm_parts: planner.PalmLoadFactors | None,
     brief: bool,
 ) -> None:
@@ -322,27 +326,12 @@ def _write_advice(
     return written
 
 
-def _without_palms(
-    request: requests.PlanRequest, robots: answering.Robots
-) -> replies.PlanReply | None:
-    """Return the reply of the plan without palms; None if the deadline ends before."""
-    replace = msgspec.structs.replace
-    hands = [replace(hand, grasp=replace(hand.grasp, palm=False)) for hand in request.stance.hands]
-    stance = replace(request.stance, hands=hands)
-    plain = replace(request, want=["load_factor"], draws=[], open_loop=None, survival=None)
-    alone = replace(plain, stance=stance, explain=False)
+def _in_time(
+    found: Callable[[planner.Question], ResultT], answer: answering.Planned
+) -> ResultT | None:
+    """Return what a function finds about a question; None if the deadline ends before."""
     try:
-        reply = answering.answer_plan(alone, robots)
-    except planner.DeadlineError:
-        return None
-    assert isinstance(reply, replies.PlanReply)  # of a whole request
-    return reply
-
-
-def _without_palm_loads(answer: answering.Planned) -> planner.PalmLoadFactors | None:
-    """Return the load factors without one of the palms' loads; None if the deadline ends before."""
-    try:
-        return planner.load_factors_without_palm_loads(answer.question)
+        return found(answer.question)
     except planner.DeadlineError:
         return None
 

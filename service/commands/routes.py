@@ -156,6 +156,8 @@ sought_options = options.asked_for(
 )
 @options.page_option
 @options.workers_options
+@options.spread_option
+@options.draws_option
 @options.own_options
 @options.json_option
 def climb_command(
@@ -165,6 +167,8 @@ def climb_command(
     page: Path | None,
     resume: bool,
     parallel: options.WorkersOption,
+    spread: bool,
+    draws: list[requests.Draw] | None,
     own: options.Own,
     as_json: bool,
 ) -> int:
@@ -179,15 +183,18 @@ def climb_command(
     """
     listing = climbs.climb_listing()
     listed = batch.is_listed(output, listing, len(rocks) > 1, resume)
-    if listed and page is not None:
-        raise InvalidInputError("is for one rock, whose output -o is a folder", field="--html")
+    for option, asked_for in {"--html": page, "--spread": spread, "--draws": draws}.items():
+        if listed and asked_for:
+            raise InvalidInputError("is for one rock, whose output -o is a folder", field=option)
+    wanted = options.Wanted(spread, draws)
     with climbs.naming_options():
         asking = sought.asking(stances.read_request)
     sources = climbs.Sources(rocks, lambda rock: own.asked(asking(Path(rock))))
     if listed:
         return _many(listing, sources, output, resume, parallel, own, as_json)
     with climbs.naming_options():
-        return search_climb(own.asked(asking(Path(rocks[0]))), output, parallel, own, as_json, page)
+        asked = own.asked(asking(Path(rocks[0])))
+        return search_climb(asked, output, parallel, own, as_json, page, wanted)
 
 
 def search_climb(
@@ -197,6 +204,7 @@ def search_climb(
     own: options.Own,
     as_json: bool,
     page: Path | None = None,
+    wanted: options.Wanted | None = None,
 ) -> int:
     """Search for a climb, write its files, and print the verdict; return the exit status."""
     tables.fill_alone(folder)
@@ -206,17 +214,19 @@ def search_climb(
     with tables.filling_folder():
         files = climbs.write_search(request, found, folder)
         if found.found.result is not None:
-            asked = _Asked.of([str(files["route"])], options.Wanted(False, None, True), own)
+            asked = _Asked.of([str(files["route"])], options.Wanted(unexplained=True), own)
             climb = found.found.climb
             files |= climbs.write_route(found.found.result, climb, folder, asked.stage)[0]
+            if wanted is not None and (wanted.spread or wanted.draws):
+                route = answering.route_of(wanted.of(asked.request), own.robots)
+                found = found._replace(found=climbs.with_spread(found.found, route))
     if page is not None:
-        with tables.writing(page, "--html"):
-            said = tuple(climbs.verdict_sentences(found.found, request.at_least))
-            shown = found.found, found.rock, found.rock_pose
-            planner.write_climb_page(*shown, page, request.name, said)
+        climbs.write_search_page(request, found, page)
         files["page"] = page
     if as_json:
         reply = msgspec.to_builtins(answering.climb_reply(request, found))
+        if (spread := climbs.spread_of(found.found)) is not None:
+            reply["deciding"]["spread"] = spread
         tables.say(reply | {"files": {name: str(path) for name, path in files.items()}})
     else:
         climbs.print_verdict(found.found, request.at_least, files, tables.console())

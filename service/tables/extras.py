@@ -13,6 +13,7 @@ from planner import (
     Advice,
     OpenLoop,
     PalmLoadFactors,
+    Plan,
     Quantiles,
     RobustLoadFactor,
     RouteSurvival,
@@ -203,8 +204,8 @@ def robust_sentence(robust: RobustLoadFactor) -> str:
 
 
 def sure_sentences(
-    reply: PlanReply,
-    without_palm: PlanReply | None = None,
+    reply: PlanReply | Plan,
+    without_palm: Plan | None = None,
     palm_parts: PalmLoadFactors | None = None,
 ) -> list[str]:
     """Return what says how sure a plan is: spread, load factors without palms, displaced hands."""
@@ -215,7 +216,7 @@ def sure_sentences(
     return said
 
 
-def palm_sentences(without_palm: PlanReply | None, palm_parts: PalmLoadFactors | None) -> list[str]:
+def palm_sentences(without_palm: Plan | None, palm_parts: PalmLoadFactors | None) -> list[str]:
     """Return the load factors of plans without the palms, and without a part of their load."""
     if without_palm is None:
         return []
@@ -226,7 +227,7 @@ def palm_sentences(without_palm: PlanReply | None, palm_parts: PalmLoadFactors |
     return said
 
 
-def load_factor_words(reply: PlanReply) -> str:
+def load_factor_words(reply: PlanReply | Plan) -> str:
     """Return the load factor of a plan, or why there is none."""
     if reply.load_factor_unbounded:
         return "unbounded"

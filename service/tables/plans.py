@@ -44,7 +44,7 @@ def print_plan(
     reply: replies.PlanReply,
     out: Console,
     *,
-    without_palm: replies.PlanReply | None = None,
+    without_palm: planner.Plan | None = None,
     palm_parts: planner.PalmLoadFactors | None = None,
     brief: bool = False,
 ) -> None:
@@ -59,7 +59,7 @@ def print_plan(
         The plan.
     out : Console
         Console to print on.
-    without_palm : PlanReply, optional
+    without_palm : Plan, optional
         Plan of the same question without palms, whose load factor is printed, too.
     palm_parts : PalmLoadFactors, optional
         Load factors without the palms' shear, and without their pressing, which are printed, too.

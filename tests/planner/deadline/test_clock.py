@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
+import planner
 from hand_models.base import InvalidInputError
 from hand_models.rock import Plane
 from planner import deadline, programs
@@ -34,7 +35,6 @@ from planner.solving import (
     solve,
     unique_plan,
 )
-from service import answering
 from service.answering import dispatch, questions
 from service.commands.cli import run_command_line
 from service.commands.stances import read_request
@@ -511,13 +511,13 @@ def test_on_the_command_line_a_deadline_that_is_too_short_is_a_failure(tmp_path,
 
 
 def test_on_the_command_line_the_plan_without_palms_may_come_too_late(tmp_path, capfd, monkeypatch):
-    original = answering.answer_plan
+    original = planner.plan_without_palms
 
-    def plan_late(request, robots):
+    def plan_late(question):
         with deadline.within(1e-9):
-            return original(request, robots)
+            return original(question)
 
-    monkeypatch.setattr(answering, "answer_plan", plan_late)
+    monkeypatch.setattr(planner, "plan_without_palms", plan_late)
     path = tmp_path / "stance.json"
     path.write_text(json.dumps(wall_request() | {"deadline": LONG}))
     assert run_command_line(["plan", str(path), "--json"]) == 0

@@ -141,7 +141,10 @@ def test_a_search_is_drawn_on_its_rock_with_its_placements(tmp_path, capfd):
     file, folder = tmp_path / "climb.html", tmp_path / "climb"
     asked = ["climb", "small-wall", "--from", "height:0.8", "--to", "height:0.8"]
     asked += ["--stand-off", "0.6", "--spacing", "0.3", "--body-spacing", "0.3", "--workers", "1"]
-    assert run_command_line([*asked, "-o", str(folder), "--html", str(file), "--json"]) == DONE
+    assert (
+        run_command_line([*asked, "-o", str(folder), "--html", str(file), "--spread", "--json"])
+        == DONE
+    )
     reply = result(capfd)
     assert file.stat().st_size < 6e6
     text = file.read_text("utf-8")
@@ -152,6 +155,24 @@ def test_a_search_is_drawn_on_its_rock_with_its_placements(tmp_path, capfd):
     assert len(bodies) == len(wall["body_pose"])
     assert (data["bound"], data["crux"]) == (reply["bound"], reply["deciding"]["stage"])
     assert min(stage["load_factor"] for stage in data["stages"]) == reply["least"]
+    crux = data["stages"][data["crux"]]
+    spread = reply["deciding"]["spread"]
+    assert crux["spread"]["utilisation"] == [spread["utilisation"][k] for k in ("low", "high")]
+    assert crux["samples"]["rows"][0][1] == spread["holds"]
+    assert any("without the palms'" in sentence for sentence in crux["sure"])
+    assert all(stage.get("advice") is None for stage in data["stages"] if stage is not crux)
+    # another placement is planned, and its palm drawn there
+    moved = [each for each in crux["advice"] if "at placement" in each["sentence"]]
+    assert moved
+    for each in moved:
+        factor, limb, place = re.match(
+            r"load factor ([\d.]+) in this stage with (\w+) at placement (\d+)", each["sentence"]
+        ).groups()
+        assert float(factor) > reply["least"]
+        assert each["holds"]
+        (move,) = (m for m in each["moves"] if m["text"].startswith(limb.replace("_", " ")))
+        np.testing.assert_allclose(np.mean(move["to"], axis=0), places[int(place)], atol=3e-4)
+        assert move["from"] != move["to"]
     # the rock is whole in each stage, and once in the page
     surfaces = [each for stage in data["stages"] for each in stage["scene"]["surfaces"]]
     rocks = [each for each in surfaces if each["kind"] == "rock"]
@@ -161,10 +182,11 @@ def test_a_search_is_drawn_on_its_rock_with_its_placements(tmp_path, capfd):
     corners = np.frombuffer(b64decode(data["meshes"][rocks[0]["corners"]]), "<f4").reshape(-1, 3)
     away, _ = cKDTree(corners).query(wall["place_pose"][:, :, 3])
     assert away.max() < 0.05
-    seen, page = opened(file, PLACES)
+    seen, page = opened(file, ADVISED + PLACES)
     assert "the bound is about the placements" in page
     assert (seen["within"], seen["below"]) == (True, True)
     assert seen["traces"] == 15 + 2
+    assert (seen["button"], seen["again"]) == ("hide", "draw")
 
 
 def test_a_climb_is_drawn_stage_by_stage(tmp_path):

@@ -97,9 +97,10 @@ def test_pages_are_of_one_route_or_rock(capfd: pytest.CaptureFixture[str], tmp_p
         assert run_command_line(["route", "knobs", "knobs", "--html", page, *more]) == BAD_INPUT
         assert complaint(capfd).startswith("crux: --html: ")
     ends = ["--from", "height:0.8", "--to", "height:0.8"]
-    asked = ["climb", "small-wall", *ends, "-o", str(tmp_path / "a.csv"), "--html", page]
-    assert run_command_line(asked) == BAD_INPUT
-    assert complaint(capfd).startswith("crux: --html: ")
+    asked = ["climb", "small-wall", *ends, "-o", str(tmp_path / "a.csv")]
+    for more in (["--html", page], ["--spread"]):
+        assert run_command_line([*asked, *more]) == BAD_INPUT
+        assert complaint(capfd).startswith(f"crux: {more[0]}: ")
     assert not Path(page).exists()
 
 
