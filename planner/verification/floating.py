@@ -326,14 +326,14 @@ def _check_stretches(
 ) -> None:
     """Check how far a plan stretches the fingers' tiles, by the shears that it returns."""
     said = np.full(len(arrays.loads), np.nan)
-    told = np.zeros(len(said), dtype=bool)
+    has = np.zeros(len(said), dtype=bool)
     for own, wrist in zip(rest.tiles_of, filter(None, arrays.wrists), strict=True):
         if wrist.stretches is not None:
             given = wrist.stretches[: own.stop - own.start]
             those = slice(own.start, own.start + len(given))
-            said[those], told[those] = given, True
+            said[those], has[those] = given, True
     stretches, shears, k = said[rest.rows], np.abs(arrays.loads[rest.rows, 0]), rest.stiffness
-    silent = np.any(rest.own & ~told[rest.rows], axis=1)
+    silent = np.any(rest.own & ~has[rest.rows], axis=1)
     # the force that would stretch each tile as far as the plan says
     off = np.abs(np.where(k > 0.0, k * stretches - shears, stretches))
     off, most = (np.where(rest.own, x, 0.0).max(axis=1) for x in (off, shears))
