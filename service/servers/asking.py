@@ -16,13 +16,12 @@ from zenoh.handlers import Callback
 from hand_models.base import CruxError
 from service.replies import ErrorReply, PartReply
 from service.requests import Request
+from service.servers.absence import silence_in_words
 from service.servers.live_servers import LiveServers
-from service.servers.topology import token_ids
 from service.wire import (
     Format,
     NoServiceError,
     ServiceError,
-    ServiceName,
     ServiceTimeout,
     check_size,
     read_reply,
@@ -30,14 +29,11 @@ from service.wire import (
     service_key,
 )
 
-__all__ = ["HOW_TO_START", "Asker", "Identity", "Parts"]
+__all__ = ["Asker", "Identity", "Parts"]
 
 Parts = Callable[[PartReply], None]
 RETRY_AFTER: Final = 0.3
 """A service that has just come back needs so long until it is reached [s]."""
-TOKEN_TIMEOUT: Final = 1.0
-"""Longest wait for a service's token, to say why there is no answer [s]."""
-HOW_TO_START: Final = "start a service with `crux serve` where this session reaches it"
 
 
 class Identity(Protocol):
@@ -123,7 +119,7 @@ class Asker:
             reply = self._get(service_key(self._robot, name), attempt)
             if reply is not None:
                 return _good(reply)
-        raise self._unanswered(name)
+        raise NoServiceError(silence_in_words(self._session, self._robot, name))
 
     def ask_one(self, server: str, name: str, request: Request, waits: float) -> zenoh.Reply | None:
         """Return the reply of one service that is no error; None if it does not reply.
@@ -184,18 +180,6 @@ class Asker:
         if server is not None and error is None:
             raise NoServiceError(f"the service at {key} ended before it had answered; ask again")
         return error
-
-    def _unanswered(self, name: str) -> NoServiceError:
-        """Return the error of a question that nobody answers, and why that may be."""
-        key = service_key(self._robot, name)
-        if token_ids(self._session, service_key(self._robot, ServiceName.ALIVE), TOKEN_TIMEOUT):
-            return NoServiceError(
-                f"a service of {self._robot} is there, but does not answer at {key}: this session "
-                "may have no right to ask there (see crux keys), or the service has just ended"
-            )
-        return NoServiceError(
-            f"no service answers at {key}; {HOW_TO_START}, or wait for it (wait, --wait)"
-        )
 
 
 class _Attempt:

@@ -40,8 +40,15 @@ from service.requests import (
     StreamRequest,
     WrenchSpaceRequest,
 )
-from service.servers import HOW_TO_START, Asker, KeptStreams, LiveServers, Parts
-from service.serving.config import open_session, patient
+from service.servers import (
+    HOW_TO_START,
+    Asker,
+    KeptStreams,
+    LiveServers,
+    Parts,
+    open_session,
+    why_absent,
+)
 from service.serving.names import ClientIdentity
 from service.serving.settings import SERVING_SETTINGS
 from service.wire import (
@@ -70,7 +77,8 @@ class CruxClient:
         An open session, which the client leaves open, or a configuration from which the client
         opens a session that `close` closes.
     robot : str, optional
-        Name of the robot whose service is asked.
+        Name of the robot whose service is asked, such as ``climber``; it is the ``name`` in the
+        file of a robot of your own.
     timeout : float, optional
         Longest wait for each reply [s]. By default 10 s, or 1/0.9 of the request's ``deadline`` if
         that is longer. A request without ``deadline`` is sent with a deadline of nine tenths of the
@@ -78,8 +86,9 @@ class CruxClient:
     form : Format, optional
         Encoding of the messages.
     wait : float, optional
-        Longest wait for a service to appear, counted from this call [s]. Without it, the service
-        must already run when the first request is sent.
+        Longest wait for a service to appear, counted from this call [s]. If the configuration has
+        several endpoints, they are tried in turn. Without it, the service must already run when the
+        first request is sent.
     spread : bool, optional
         True to share the questions among all services of the robot that are there, in turns, each
         time one that has fewest of this client's questions. If a service ends or is too busy,
@@ -138,13 +147,15 @@ class CruxClient:
 
     def _opened(self, config: zenoh.Config, wait: float | None) -> zenoh.Session:
         try:
-            return open_session(config if wait is None else patient(config, wait))
+            return open_session(config, wait)
         except NoServiceError as error:
             if wait is None:
                 raise NoServiceError(
                     f"{error}; {HOW_TO_START}, or wait for it (wait, --wait)"
                 ) from None
-            raise self._not_come(wait, f" ({error})") from None
+            raise NoServiceError(
+                f"{_not_within(self.robot, wait)} ({error}); {HOW_TO_START}"
+            ) from None
 
     def _await(self, wait: float, begun: float) -> None:
         """Wait for the service's token, which is there when it answers."""
@@ -158,12 +169,10 @@ class CruxClient:
         tokens = self._session.liveliness().declare_subscriber(key, taken, history=True)
         try:
             if not there.wait(max(wait - (time.monotonic() - begun), 0.0)):
-                raise self._not_come(wait)
+                why = why_absent(self._session, self.robot)
+                raise NoServiceError(f"{_not_within(self.robot, wait)}: {why}")
         finally:
             tokens.undeclare()
-
-    def _not_come(self, wait: float, why: str = "") -> NoServiceError:
-        return NoServiceError(f"no service of {self.robot} within {wait:g} s{why}; {HOW_TO_START}")
 
     def __enter__(self) -> Self:
         return self
@@ -348,3 +357,7 @@ class CruxClient:
             own = min(part * waits, LONGEST_DEADLINE)
             request = msgspec.structs.replace(request, deadline=own)
         return request, waits
+
+
+def _not_within(robot: str, wait: float) -> str:
+    return f"no service of {robot} within {wait:g} s"

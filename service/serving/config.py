@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 import os
 import re
 import socket
@@ -19,7 +18,8 @@ import msgspec
 import zenoh
 
 from hand_models.base import InvalidInputError
-from service.wire import LARGEST_REQUEST, NoServiceError
+from service.servers import first_line, open_session
+from service.wire import LARGEST_REQUEST
 
 __all__ = [
     "SESSION_MODES",
@@ -28,7 +28,6 @@ __all__ = [
     "exposed",
     "listening",
     "open_session",
-    "patient",
     "start_zenoh_log",
     "zenoh_config",
 ]
@@ -36,16 +35,6 @@ __all__ = [
 log = logging.getLogger(__name__)
 
 SESSION_MODES: Final = ("peer", "client", "router")
-TLS_SECRETS: Final = tuple(
-    f"transport/link/tls/{name}_base64"
-    for name in (
-        "root_ca_certificate",
-        "connect_certificate",
-        "connect_private_key",
-        "listen_certificate",
-        "listen_private_key",
-    )
-)
 
 
 def own_settings() -> dict[str, object]:
@@ -141,53 +130,6 @@ def zenoh_config(
     return config
 
 
-def patient(config: zenoh.Config, seconds: float) -> zenoh.Config:
-    """Return a copy of a zenoh configuration whose session keeps trying to connect (retry).
-
-    In client mode, opening the session gives up after the timeout. In other modes, the open session
-    retries in the background.
-
-    Parameters
-    ----------
-    config : zenoh.Config
-        Configuration to copy; left unchanged.
-    seconds : float
-        Timeout of connecting and of searching, in client mode [s].
-    """
-    copy = zenoh.Config.from_json5(str(config))
-    for name in TLS_SECRETS:
-        # these zenoh leaves out of the text of a configuration
-        if msgspec.json.decode(value := config.get_json(name)) is not None:
-            copy.insert_json5(name, value)
-    if msgspec.json.decode(copy.get_json("connect/retry")) is None:
-        retries = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
-        copy.insert_json5("connect/retry", _json(retries))
-    if msgspec.json.decode(copy.get_json("mode")) == "client":
-        # others go on looking while they are open
-        for key in ("connect/timeout_ms", "scouting/timeout"):
-            copy.insert_json5(key, _json(math.ceil(1e3 * seconds)))
-    return copy
-
-
-def open_session(config: zenoh.Config) -> zenoh.Session:
-    """Open a zenoh session from a configuration.
-
-    Raises
-    ------
-    NoServiceError
-        If zenoh cannot open the session: nobody to connect to, or an address that is in use.
-    """
-    try:
-        return zenoh.open(config)
-    except zenoh.ZError as error:
-        said = _first_line(error)
-        # zenoh does not say why a link over TLS is refused
-        checks = " and its certificates (crux keys list)" if "tls/" in said else ""
-        raise NoServiceError(
-            f"no zenoh session: {said}; check its endpoints (--connect, --listen){checks}"
-        ) from None
-
-
 @contextmanager
 def ended_in_time(session: zenoh.Session) -> Iterator[zenoh.Session]:
     """Return a context manager that closes a session at its end, within half a second.
@@ -206,7 +148,7 @@ def ended_in_time(session: zenoh.Session) -> Iterator[zenoh.Session]:
             try:
                 session.close()
             except zenoh.ZError as error:
-                log.warning("%s", _first_line(error))
+                log.warning("%s", first_line(error))
             closed.set()
 
         threading.Thread(target=close, name="crux-close", daemon=True).start()
@@ -364,12 +306,6 @@ def _must_be_endpoint(endpoint: str, flag: str) -> None:
 
 def _json(value: object) -> str:
     return msgspec.json.encode(value).decode()
-
-
-def _first_line(error: Exception) -> str:
-    """Return zenoh's complaint without where in its source it was made."""
-    said = str(error).partition(" at /")[0].partition("\n")[0]
-    return re.sub(r"Single\((.*?)\)", r"\1", said).strip(" !")
 
 
 def _complaint(error: Exception) -> str:

@@ -119,7 +119,8 @@ def test_zenoh_may_talk_but_not_on_standard_output(stance_file):
     assert b"DEBUG" in asked.stderr
     told = asked.stderr.splitlines()[-1]
     assert told.startswith(
-        b"crux: no service answers at crux/robosimian/plan; start a service with `crux"
+        b"crux: no service answers at crux/robosimian/plan: this session is connected to nobody; "
+        b"start a service with `crux"
     )
 
 
@@ -163,7 +164,8 @@ def test_how_long_a_client_waits_is_checked_before_it_does(wait):
 def test_a_client_of_another_robot_s_service_waits_in_vain(served):
     with zenoh.open(client_config(served.endpoint)) as session:
         with pytest.raises(
-            NoServiceError, match=r"no service of loris within 0\.2 s; start a service"
+            NoServiceError,
+            match=r"no service of loris within 0\.2 s: services of robosimian are there",
         ):
             CruxClient(session, "loris", wait=0.2)
         assert not session.is_closed()
