@@ -5,7 +5,11 @@ from .bounded_store import (
     stored as stored,
     stores as stores,
 )
-from .compiling import compiled as compiled, record_of as record_of
+from .compiling import (
+    compiled as compiled,
+    has_compiled as has_compiled,
+    record_of as record_of,
+)
 from .distribution import (
     DISTRIBUTION_NAME as DISTRIBUTION_NAME,
     installed_version as installed_version,

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["compiled", "record_of"]
+__all__ = ["compiled", "has_compiled", "record_of"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -44,6 +47,32 @@ def compiled(*arguments: str | np.dtype[Any]) -> Callable[[Function], Function]:
         return cast("Function", made)
 
     return decorated
+
+
+def has_compiled(module: str) -> bool:
+    """Return whether numba's cache has a module's functions as the module is now.
+
+    Looks for files alone: numba is not imported, nor is the module.
+
+    Parameters
+    ----------
+    module : str
+        Full name of a module with `compiled` functions.
+    """
+    spec = find_spec(module)
+    if spec is None or spec.origin is None:
+        return False
+    source = Path(spec.origin)
+    changed = source.stat().st_mtime
+    own = os.environ.get("NUMBA_CACHE_DIR")
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "numba")
+    # numba keeps what it compiles beside the source, or where it cannot write there, of each user
+    places = [Path(own)] if own else [source.parent / "__pycache__", home]
+    return any(
+        kept.stat().st_mtime > changed
+        for place in places
+        for kept in place.rglob(f"{source.stem}.*.nbi")
+    )
 
 
 def record_of(numbers: Mapping[str, float]) -> NDArray[np.void]:

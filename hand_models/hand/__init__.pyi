@@ -1,4 +1,7 @@
-from .closed_fingers import load_closing as load_closing
+from .closed_fingers import (
+    closing_is_compiled as closing_is_compiled,
+    load_closing as load_closing,
+)
 from .finger_frames import FingerFrame as FingerFrame
 from .grasp import Grasp as Grasp, Placing as Placing, WristTravel as WristTravel
 from .model import HandModel as HandModel

@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, RefusedPlaceError, go_on
+from hand_models.base import Array, InvalidInputError, RefusedPlaceError, go_on, has_compiled
 from hand_models.finger import (
     CONTACT_KINDS,
     JOINT_STOPS,
@@ -36,11 +36,12 @@ from hand_models.hand.placement import PlacedHands, Placement
 from hand_models.hand.settled_hand import HandPostures
 from hand_models.rock import load_compiled
 
-__all__ = ["ClosedFingers", "close_fingers", "load_closing"]
+__all__ = ["ClosedFingers", "close_fingers", "closing_is_compiled", "load_closing"]
 
 FingerNumbers = list[float]
 """Numbers of a closed finger, phalanx by phalanx: three times the `PHALANX_NUMBERS`."""
 
+CLOSING_MODULE: Final = "hand_models.finger.closing"
 PHALANX_NUMBERS: Final = 24
 """Numbers of a phalanx: its angle [rad], its contact's place along and above it [m] and tilt [rad],
 its joint [m]; its shear and normal load, each at zero tension [N] and per newton; the share of its
@@ -133,7 +134,12 @@ class ClosedFingers:
 def load_closing() -> None:
     """Import what numba compiles to cut rock and to close fingers, so that no hand waits for it."""
     load_compiled()
-    import_module("hand_models.finger.closing")
+    import_module(CLOSING_MODULE)
+
+
+def closing_is_compiled() -> bool:
+    """Return whether `load_closing` finds compiled code; it takes minutes if it must compile it."""
+    return has_compiled(CLOSING_MODULE)
 
 
 def close_fingers(

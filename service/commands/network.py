@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import logging
 import os
-import signal
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -17,9 +16,9 @@ import click
 
 import planner
 from hand_models.base import InvalidInputError
+from hand_models.hand import closing_is_compiled
 from service import (
     operating,
-    processes,
     recording,
     requests,
     ros2 as ros,
@@ -184,7 +183,7 @@ def serve_command(
             as_json,
         )
         return
-    stop = _StopSignal()
+    stop = operating.StopSignal()
     planner.begin_fork_server()  # it loads what workers need, while this process loads zenoh
     # a client that does not read blocks one of these threads while zenoh waits for it
     threads = "(rx: (worker_threads: 4), net: (worker_threads: 4), tx: (worker_threads: 4))"
@@ -220,7 +219,9 @@ def serve_command(
         if rivals := service.rivals():
             tables.note(rivals)
         where = ", ".join(endpoints) or "no address"
-        tables.remark(f"listening on {where}; the workers start, which takes some seconds")
+        compiled = closing_is_compiled()
+        start = "takes some seconds" if compiled else "compiles for minutes, once per installation"
+        tables.remark(f"listening on {where}; the start of the workers {start}")
         with service:
             stop.waits_for()
             # what is loaded stays: no question waits until it is looked through for garbage
@@ -238,6 +239,9 @@ def serve_command(
                     "publishes about this session (@/**); access control is zenoh's (-c FILE)"
                 )
             with operating.supervised(service.is_alive):
+                # one that started at the same time has its token by now
+                if (found := service.rivals()) and found != rivals:
+                    tables.note(found)
                 stop.wait()
 
 
@@ -249,42 +253,6 @@ def _say_checked(found: dict[str, Any], as_json: bool) -> None:
     for word, value in found.items():
         text = ", ".join(map(str, value)) if isinstance(value, list | tuple) else value
         tables.console().print(f"{word}: {'none' if text in (None, '') else text}", markup=False)
-
-
-class _StopSignal:
-    """Handler of SIGTERM and Ctrl-C; at first they end this process and its child processes.
-
-    A signal may arrive in a thread of zenoh or of a solver, and then does not wake the main
-    thread. The byte that the handler writes to a pipe wakes it.
-    """
-
-    NUMBERS = (signal.SIGINT, signal.SIGTERM)
-
-    def __init__(self) -> None:
-        self._arrived, wakeup = os.pipe()
-        os.set_blocking(wakeup, False)
-        signal.set_wakeup_fd(wakeup, warn_on_full_buffer=False)
-        for number in self.NUMBERS:
-            signal.signal(number, _leave)
-
-    def waits_for(self) -> None:
-        """Let signals end `wait`, not the process, so that open questions are answered first."""
-        for number in self.NUMBERS:
-            signal.signal(number, lambda *_: None)
-
-    def wait(self) -> None:
-        """Wait for the first signal; a second one kills the process."""
-        os.read(self._arrived, 1)
-        for number in self.NUMBERS:
-            signal.signal(number, signal.SIG_DFL)
-
-
-def _leave(*_: object) -> None:
-    try:
-        # a child process may just be starting
-        processes.kill_children()
-    finally:
-        os._exit(0)
 
 
 @click.command("query")

@@ -5,6 +5,7 @@ from .moved import (
     replay_json as replay_json,
 )
 from .options_file import read_options as read_options
+from .stop_signal import StopSignal as StopSignal
 from .supervision import supervised as supervised
 from .top import (
     Snapshot as Snapshot,

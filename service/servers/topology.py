@@ -34,7 +34,7 @@ def rivals_in_words(session: zenoh.Session, robot: str, timeout: float) -> str |
     Parameters
     ----------
     session : zenoh.Session
-        Session of a service that has no token yet.
+        Session of a service, whose own token does not count.
     robot : str
     timeout : float
         Longest wait for the tokens of others [s].
@@ -44,7 +44,7 @@ def rivals_in_words(session: zenoh.Session, robot: str, timeout: float) -> str |
     str or None
         None where there is no other service.
     """
-    rivals = token_ids(session, server_key(robot, "*"), timeout)
+    rivals = token_ids(session, server_key(robot, "*"), timeout) - {str(session.info.zid())}
     if not rivals:
         return None
     linked = rivals & {str(each.zid) for each in session.info.transports()}

@@ -140,7 +140,8 @@ class PlanService:
     def rivals(self) -> str | None:
         """Return what happens to questions, as others answer for the robot; None if nobody does.
 
-        Call it before entering. The search takes up to 1 s.
+        The search takes up to 1 s. Of two services that start at a time, each finds the other only
+        once it has entered.
         """
         return rivals_in_words(self._session, self.robot, SERVING_SETTINGS.search_timeout)
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import queue
 import random
 import re
 import signal
+import subprocess
 import sys
 import threading
 from collections.abc import Iterator
@@ -32,6 +34,7 @@ from service.wire import (
     server_key,
     service_key,
 )
+from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.patience import PATIENCE, soon
 from tests.suite.helpers.replies import check_answer
 from tests.suite.helpers.requests import (
@@ -325,9 +328,30 @@ def test_a_signal_stops_the_server_cleanly(number: int, busy: bool) -> None:
     assert {reply.error.kind for reply in refused} <= {"busy", "lost"}
     assert out == ""
     assert err.splitlines() == [
-        f"crux: listening on {server.endpoint}; the workers start, which takes some seconds",
+        f"crux: listening on {server.endpoint}; the start of the workers takes some seconds",
         f"crux: ready; serving {', '.join(KEYS)}",
     ]
+
+
+@pytest.mark.slow
+def test_a_server_says_that_its_first_start_compiles(tmp_path: Path) -> None:
+    """Where numba has kept nothing; this one is not waited for."""
+    flags = ["-m", "peer", "-l", free_endpoint(), "--no-multicast-scouting"]
+    server = subprocess.Popen(
+        [sys.executable, "-m", "service", "serve", *flags],
+        stderr=subprocess.PIPE,
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path)},
+        start_new_session=True,
+    )
+    try:
+        said = server.stderr.readline().decode()
+    finally:
+        # with the process that compiles
+        os.killpg(server.pid, signal.SIGKILL)
+        server.communicate(timeout=PATIENCE)
+    assert said.startswith("crux: listening on ")
+    assert said.endswith("; the start of the workers compiles for minutes, once per installation\n")
 
 
 @pytest.mark.slow
@@ -357,8 +381,14 @@ def test_a_rival_is_one_of_the_same_robot_and_while_it_serves() -> None:
     with open_session(first) as there, open_session(second) as here:
         service = PlanService(here)
         assert not service.rivals()
-        with PlanService(there):
+        with PlanService(there) as other:
             assert soon(service.rivals)
+            # its own token is none of a rival
+            assert not other.rivals()
+            with service:
+                # both are ready, and each sees the other
+                assert soon(other.rivals)
+                assert soon(service.rivals)
             assert not PlanService(here, RobotFile("lemur", toml="", urdf="")).rivals()
         assert soon(lambda: not service.rivals())
 
