@@ -118,12 +118,35 @@ class Format(Enum):
             if self is Format.JSON:
                 return msgspec.json.decode(payload, type=kind)
             return msgspec.msgpack.decode(payload, type=kind)
-        except msgspec.ValidationError:
-            raise
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
-            raise MalformedError(f"not valid {self.name}: {error}") from None
+            other = self._contradicted(payload)
+            # MessagePack reads the first letter of JSON as a number
+            if isinstance(error, msgspec.ValidationError) and other is None:
+                raise
+            said = f"not valid {self.name}: {error}" if other is None else other
+            raise MalformedError(said) from None
         except RecursionError:
             raise _too_deep() from None
+
+    def _contradicted(self, payload: bytes) -> str | None:
+        """Return that bytes look like the other format; None if they do not.
+
+        Every message is an object: in JSON it begins with a brace, in MessagePack with the byte of
+        a map.
+        """
+        first = payload.lstrip()[:1]
+        looks = None
+        if first in (b"{", b"["):
+            looks = Format.JSON
+        elif payload[0] in range(0x80, 0x90) or payload[0] in (0xDE, 0xDF):
+            looks = Format.MSGPACK
+        if looks in (None, self):
+            return None
+        words = {Format.JSON: "JSON", Format.MSGPACK: "MessagePack"}
+        return (
+            f"the encoding says {words[self]}; the bytes look like {words[looks]}: send "
+            f"{words[self]}, or say {looks.value}"
+        )
 
 
 def _too_deep() -> MalformedError:

@@ -99,6 +99,20 @@ def test_bytes_that_are_no_message() -> None:
         assert len(answer.payload) < 1000
 
 
+def test_bytes_of_the_other_encoding_are_recognised() -> None:
+    request = plan_request()
+    names = {Format.JSON: "JSON", Format.MSGPACK: "MessagePack"}
+    for said, sent in [(Format.JSON, Format.MSGPACK), (Format.MSGPACK, Format.JSON)]:
+        told = f"the encoding says {names[said]}; the bytes look like {names[sent]}: .*{sent.value}"
+        with pytest.raises(MalformedError, match=told):
+            decode_request(sent.encode(request), PlanRequest, said)
+    # what is of its encoding has the errors that it had
+    for form in Format:
+        with pytest.raises(InvalidInputError) as wrong:
+            decode_request(form.encode({"v": "one"}), PlanRequest, form)
+        assert wrong.value.kind == "invalid"
+
+
 def test_errors_do_not_grow_with_the_request() -> None:
     for key, value in itertools.product(("x" * 500_000, "id"), ("y" * 500_000,)):
         answer = dispatch.handle(PLAN, msgspec.json.encode({key: value}))
