@@ -12,6 +12,7 @@ import zenoh
 from prometheus_client.parser import text_string_to_metric_families
 
 from service.replies import HealthReply
+from service.servers import silence_in_words
 from service.tables import PrintedColumn, name, number
 from service.wire import NoServiceError, ServiceName, service_key
 
@@ -67,9 +68,7 @@ def read_snapshot(session: zenoh.Session, robot: str, timeout: float) -> Snapsho
     for key in (service_key(robot, each) for each in (ServiceName.HEALTH, ServiceName.METRICS)):
         replies = [each.ok for each in session.get(key, timeout=timeout) if each.ok is not None]
         if not replies:
-            raise NoServiceError(
-                f"no service answers at {key} within {timeout:g} s; start one with `crux serve`"
-            )
+            raise NoServiceError(silence_in_words(session, robot, key.rpartition("/")[2]))
         found.append(replies[0].payload.to_bytes())
     samples = {
         (each.name, frozenset(each.labels.items())): each.value

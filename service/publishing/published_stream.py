@@ -116,6 +116,16 @@ class PublishedStream:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    @property
+    def away(self) -> bool:
+        """True while no service is known to keep the stream: nothing that is published is answered.
+
+        It becomes true when the service's token of the stream is gone, at once where a link breaks,
+        and within 10 s where a machine is cut off; false once the stream is declared again.
+        """
+        with self._changed:
+            return self._away
+
     def close(self) -> None:
         """Publish and receive no more; the service keeps the stream until others put it out."""
         with self._changed:
@@ -185,7 +195,7 @@ class PublishedStream:
         Returns
         -------
         PublishedReply or None
-            None if none has come.
+            None if none has come: there are no news, or no service, if `away` is true.
 
         Raises
         ------

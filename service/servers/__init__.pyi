@@ -1,4 +1,8 @@
-from .absence import HOW_TO_START as HOW_TO_START, why_absent as why_absent
+from .absence import (
+    HOW_TO_START as HOW_TO_START,
+    silence_in_words as silence_in_words,
+    why_absent as why_absent,
+)
 from .asking import Asker as Asker, Parts as Parts
 from .kept_streams import KeptStreams as KeptStreams
 from .live_servers import LiveServers as LiveServers

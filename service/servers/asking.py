@@ -129,6 +129,19 @@ class Asker:
         reply = self._at(server, _Attempt(name, request, waits, None))
         return None if reply is None else _good(reply)
 
+    def look(self, name: str, waits: float) -> zenoh.Sample:
+        """Return the reply of the nearest service at a key that takes no request.
+
+        Raises
+        ------
+        NoServiceError
+            If nobody answers within the longest wait ``waits`` [s].
+        """
+        for reply in self._session.get(service_key(self._robot, name), timeout=waits):
+            if reply.ok is not None:
+                return reply.ok
+        raise NoServiceError(silence_in_words(self._session, self._robot, name))
+
     def _at(self, server: str, attempt: _Attempt) -> zenoh.Reply | None:
         """Return the last reply of one service, or None."""
         asking = nullcontext() if self._servers is None else self._servers.asking(server)

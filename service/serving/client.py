@@ -21,6 +21,7 @@ from service.replies import (
     CancelReply,
     ClimbReply,
     DiagnosisReply,
+    HealthReply,
     PlanReply,
     RouteReply,
     SetPointsReply,
@@ -335,6 +336,19 @@ class CruxClient:
         Raises the errors that `plan` raises.
         """
         return read_reply(self._ask(ServiceName.DIAGNOSIS, request), DiagnosisReply)
+
+    def health(self) -> HealthReply:
+        """Return the health of a service: workers, queue, streams, the last failure.
+
+        It is that of zenoh's nearest service, which an observer may ask, too.
+
+        Raises
+        ------
+        NoServiceError
+            If nobody answers within the client's timeout.
+        """
+        waits = self.timeout or SERVING_SETTINGS.client_timeout
+        return read_reply(self._asker.look(ServiceName.HEALTH, waits), HealthReply)
 
     def _replied(self, name: str, request: Query) -> zenoh.Reply:
         return self._asker.ask(name, *self._timed(request))

@@ -362,6 +362,24 @@ def tokens(session: zenoh.Session) -> set[str]:
     return {str(reply.ok.key_expr).rpartition("/")[2] for reply in replies}
 
 
+def test_a_client_knows_that_its_service_is_away_and_when_it_is_back() -> None:
+    endpoint = free_endpoint()
+    config = zenoh_config(mode="router", listen=[endpoint], multicast=False)
+    with open_session(config) as router, CruxClient(client_config(endpoint)) as client:
+        with PlanService(router, workers=1, make=answer_slowly):
+            opened = client.publish_stream(declaration())
+            assert not opened.away
+            received(opened, opened.publish([0.0] * 6))
+            # there is a service, and no news
+            assert (opened.receive(0), opened.away) == (None, False)
+        with opened as stream:
+            assert soon(lambda: stream.away)
+            assert stream.receive(0) is None
+            with PlanService(router, workers=1, make=answer_slowly):
+                assert soon(lambda: not stream.away)
+                assert stream.declarations == 2
+
+
 def test_who_lost_its_worker_takes_up_again(slow: str) -> None:
     with (
         CruxClient(client_config(slow), timeout=PATIENCE) as client,

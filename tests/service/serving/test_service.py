@@ -197,6 +197,17 @@ def test_the_client_raises_what_the_service_says(session: zenoh.Session) -> None
     assert not session.is_closed()
 
 
+def test_the_client_asks_for_the_service_s_health(session: zenoh.Session) -> None:
+    with CruxClient(session, timeout=PATIENCE) as client:
+        before = client.health()
+        client.plan(plan_request())
+        after = client.health()
+    assert (after.robot, after.replied - before.replied) == ("robosimian", 1)
+    assert {"questions", "streams"} <= {each.purpose for each in after.processes}
+    with pytest.raises(NoServiceError, match="no service answers at crux/loris/health"):
+        CruxClient(session, "loris").health()
+
+
 def test_nobody_there() -> None:
     with pytest.raises(NoServiceError, match="no zenoh session"):
         CruxClient(client_config(free_endpoint()))
