@@ -82,8 +82,9 @@ def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
     def with_config(no_multicast_scouting: bool, **given: Any) -> Any:
         names = ("mode", "connect", "listen", "file", "settings")
         flags = {name: given.pop(name) for name in names}
-        config = serving.zenoh_config(**flags, multicast=not no_multicast_scouting)
-        return command(config=config, **given)
+        with operating.naming_file(click.get_current_context()):
+            config = serving.zenoh_config(**flags, multicast=not no_multicast_scouting)
+            return command(config=config, **given)
 
     return with_config
 
@@ -198,6 +199,7 @@ def serve_command(
     serving.start_zenoh_log()
     serving.closed(config)
     endpoints = serving.listening(config)
+    operating.check_endpoints(endpoints, metrics_port)
     with serving.ended_in_time(serving.open_session(config)) as session, ExitStack() as stack:
         recorder = None
         if record is not None:
@@ -246,7 +248,9 @@ def serve_command(
 
 
 def _say_checked(found: dict[str, Any], as_json: bool) -> None:
-    """Print what would be served."""
+    """Print what would be served; with verbosity -1 only as JSON."""
+    if tables.verbosity() < 0 and not as_json:
+        return
     if as_json:
         tables.say({"v": 1} | {key.replace(" ", "_"): value for key, value in found.items()})
         return

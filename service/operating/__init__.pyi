@@ -4,7 +4,7 @@ from .moved import (
     print_replay as print_replay,
     replay_json as replay_json,
 )
-from .options_file import read_options as read_options
+from .options_file import naming_file as naming_file, read_options as read_options
 from .stop_signal import StopSignal as StopSignal
 from .supervision import supervised as supervised
 from .top import (

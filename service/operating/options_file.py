@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import click
+from click.core import ParameterSource
 
 from hand_models.base import InvalidInputError, errors_under, in_file
 
-__all__ = ["read_options"]
+__all__ = ["naming_file", "read_options"]
+
+GIVEN_OPTIONS: Final = f"{__name__}.given"
+"""Where the context of a command keeps the file and the options that it gives."""
 
 
 def read_options(path: Path, context: click.Context, without: frozenset[str]) -> dict[str, Any]:
@@ -52,7 +58,37 @@ def read_options(path: Path, context: click.Context, without: frozenset[str]) ->
             assert option.name is not None
             with errors_under(name):
                 found[option.name] = _value(option, value, path.parent, context)
+    names = {f"--{name}": option.name for name, option in known.items() if option.name in found}
+    context.meta[GIVEN_OPTIONS] = path, names
     return found
+
+
+@contextmanager
+def naming_file(context: click.Context) -> Iterator[None]:
+    """Context manager that names the file in errors of options that it gives.
+
+    Parameters
+    ----------
+    context : click.Context
+        Context for which `read_options` was called, or not.
+
+    Raises
+    ------
+    InvalidInputError
+        In place of an InvalidInputError whose field is an option, such as ``--listen``.
+    """
+    try:
+        yield
+    except InvalidInputError as error:
+        path, names = context.meta.get(GIVEN_OPTIONS, (None, {}))
+        option = names.get(error.field)
+        if option is None or (
+            # the file itself was given there, and may name another
+            option != "file" and context.get_parameter_source(option) is ParameterSource.COMMANDLINE
+        ):
+            raise
+        name = str(error.field).removeprefix("--")
+        raise InvalidInputError(error.message, field=f"{path}: {name}") from None
 
 
 def _value(option: click.Option, value: Any, folder: Path, context: click.Context) -> Any:
@@ -68,12 +104,16 @@ def _value(option: click.Option, value: Any, folder: Path, context: click.Contex
         if not all(entries):
             raise InvalidInputError(f"must name a file, got {value!r}")
         entries = [str(folder / each) for each in entries]
-    else:
-        try:
-            for each in entries:
-                option.type.convert(each, option, context)
-        except click.BadParameter as error:
-            raise InvalidInputError(f"{error.message.rstrip('.')}; got {value!r}") from None
+    try:
+        read = tuple(option.type.convert(each, option, context) for each in entries)
+        if option.callback is not None and not option.is_eager:
+            # what reads several files; an eager one reads this file
+            option.callback(context, option, read if option.multiple else read[0])
+    except InvalidInputError as error:
+        # of a file that the option names
+        raise InvalidInputError(str(error)) from None
+    except click.BadParameter as error:
+        raise InvalidInputError(f"{error.message.rstrip('.')}; got {value!r}") from None
     return entries if option.multiple else entries[0]
 
 

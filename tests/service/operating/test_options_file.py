@@ -73,6 +73,15 @@ def test_zenohs_own_file_is_read_as_ever(tmp_path, capfd):
         ('log-format = "xml"', r"log-format: 'xml' is not one of 'text', 'json'"),
         ("[serve]\nworkers = 2", r"serve: unknown option"),
         ("workers 2", r"Expected '=' after a key"),
+        ('robot = "nosuch.toml"', r"serve.toml: robot: .*nosuch.toml: No such file or directory"),
+        ('hand = "nosuch.toml"', r"serve.toml: hand: .*nosuch.toml: No such file or directory"),
+        ('config = "no.json5"', r"serve.toml: config: .*no.json5: No such file or directory"),
+        ('listen = "tcp/127.0.0.1"', r"serve.toml: listen: 'tcp/127.0.0.1' is not an endpoint"),
+        ('connect = ["tcp"]', r"serve.toml: connect: 'tcp' is not an endpoint"),
+        ('record = "a.txt"', r"serve.toml: record: must end in .mcap"),
+        ('record = "no/a.mcap"', r"serve.toml: record: cannot write"),
+        ("domain = 3", r"serve.toml: domain: has no meaning without --ros2"),
+        ('cfg = "mode"', r"serve.toml: cfg: KEY:VALUE is needed"),
     ],
 )
 def test_what_is_wrong_in_the_file_is_told(tmp_path, capfd, text, told):
@@ -82,6 +91,31 @@ def test_what_is_wrong_in_the_file_is_told(tmp_path, capfd, text, told):
     line = complaint(capfd)
     assert str(file) in line
     assert re.search(told, line), line
+
+
+def test_an_option_of_the_command_line_is_none_of_the_file(tmp_path, capfd):
+    file = tmp_path / "serve.toml"
+    file.write_text('listen = "tcp/127.0.0.1:1"\nrecord = "a.mcap"\n')
+    assert run_command_line(["serve", "-c", str(file), "-l", "tcp/1", "--check"]) == BAD_INPUT
+    assert complaint(capfd).startswith("crux: --listen: 'tcp/1' is not an endpoint")
+
+
+def test_a_quiet_check_says_what_is_wrong_and_nothing_else(capfd):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        endpoint = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+        said = []
+        # the start says what the check says
+        for more in (["--check", "-q"], []):
+            assert run_command_line(["serve", "-l", endpoint, *more]) == BAD_INPUT
+            said.append(complaint(capfd))
+    assert said[0].startswith(
+        f"crux: --listen: {endpoint} cannot be opened: Address already in use"
+    )
+    assert said[0] == said[1]
+    assert run_command_line(["serve", "--check", "-q"]) == DONE
+    assert capfd.readouterr() == ("", "")
 
 
 def test_one_file_and_for_serve_alone(tmp_path, capfd):
