@@ -240,7 +240,7 @@ def _is_loopback(endpoint: str) -> bool:
 def start_zenoh_log() -> None:
     """Start zenoh's log on standard error: errors, or the levels in the variable ``RUST_LOG``.
 
-    Zenoh writes its log to file descriptor 1, standard output, which is for results. Descriptor 1
+    The log has colours on a terminal alone. Zenoh writes it to file descriptor 1, standard output, which is for results. Descriptor 1
     therefore becomes a copy of standard error, and `sys.stdout` writes to the original standard
     output.
     """
@@ -249,7 +249,13 @@ def start_zenoh_log() -> None:
     results = os.dup(standard_output)
     os.dup2(standard_error, standard_output)
     sys.stdout = os.fdopen(results, "w", encoding=sys.stdout.encoding)
+    plain = not os.isatty(standard_error) and "NO_COLOR" not in os.environ
+    if plain:
+        # zenoh colours what it writes to files and journals, too
+        os.environ["NO_COLOR"] = "1"
     zenoh.init_log_from_env_or("error")
+    if plain:
+        del os.environ["NO_COLOR"]
 
 
 def _read(file: Path | None) -> zenoh.Config:

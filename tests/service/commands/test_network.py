@@ -112,6 +112,8 @@ def test_zenoh_may_talk_but_not_on_standard_output(stance_file):
     )
     assert (asked.returncode, asked.stdout) == (FAILED, b"")
     assert b"DEBUG" in asked.stderr
+    # colours are for terminals
+    assert b"\x1b[" not in asked.stderr
     told = asked.stderr.splitlines()[-1]
     assert told.startswith(
         b"crux: no service answers at crux/robosimian/plan: this session is connected to nobody; "
