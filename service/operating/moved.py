@@ -24,8 +24,11 @@ def note_losses(recording: Recording, file: Path) -> None:
             "before it has been replayed"
         )
     if recording.damaged:
-        chunks = counted(recording.damaged, "chunk")
-        note(f"{file} is damaged: {chunks} cannot be read, and their questions are left out")
+        whole = "" if recording.whole else " so far"
+        note(
+            f"{file} is damaged: {recording.damaged:,} of {counted(recording.chunks, 'chunk')}"
+            f"{whole} cannot be read, and their questions are left out"
+        )
 
 
 def replay_json(replay: Replay) -> dict[str, Any]:
@@ -36,11 +39,13 @@ def replay_json(replay: Replay) -> dict[str, Any]:
         "replayed": installed_version(),
         "whole": replay.recording.whole,
         "damaged": replay.recording.damaged,
+        "chunks": replay.recording.chunks,
         "asked": replay.asked,
         "equal": replay.equal,
         "within_gap": replay.near,
         "moved": replay.moved,
         "left_out": replay.left_out,
+        "skipped": replay.skipped,
         "fields": [
             {
                 "answer": each.kind,
@@ -79,6 +84,7 @@ def print_replay(replay: Replay, out: Console) -> None:
         ),
         "moved": replay.moved,
         "not asked, as their answers depend on more than the question": replay.left_out,
+        "skipped by the service for newer wrenches, so there are no answers": replay.skipped,
     }
     for words, count in lines.items():
         if count or words.startswith("equal to"):

@@ -57,8 +57,8 @@ class Recording:
         follows cannot be found; None before it is read.
     read : int
         How much of the file has been read [bytes].
-    damaged : int
-        Number of damaged chunks, whose questions are left out.
+    chunks, damaged : int
+        Number of chunks so far, and of those that are damaged: their questions are left out.
 
     Raises
     ------
@@ -76,7 +76,7 @@ class Recording:
         self._path = path
         self.about: dict[str, str] = {}
         self.whole: bool | None = None
-        self.read = self.damaged = 0
+        self.read = self.chunks = self.damaged = 0
         for _ in self._records(until_about=True):
             pass
         if not self.about:
@@ -125,7 +125,7 @@ class Recording:
         from mcap.stream_reader import StreamReader
 
         topics: dict[int, str] = {}
-        self.damaged = chunks = 0
+        self.damaged = self.chunks = 0
         try:
             with self._path.open("rb") as stream:
                 size = self._path.stat().st_size
@@ -137,9 +137,11 @@ class Recording:
                                 return
                         elif isinstance(record, Statistics):
                             # one whose kind was damaged has been passed over
-                            self.damaged += max(record.chunk_count - chunks, 0)
+                            passed = max(record.chunk_count - self.chunks, 0)
+                            self.damaged += passed
+                            self.chunks += passed
                         elif isinstance(record, Chunk):
-                            chunks += 1
+                            self.chunks += 1
                             for each in self._of_chunk(record):
                                 if isinstance(each, Channel):
                                     topics[each.id] = each.topic

@@ -59,7 +59,8 @@ class Replay:
 
     A question is asked as it was, but without its deadline; only searches for climbs keep theirs.
     Not asked are questions whose answers depend on more than the question: refused or cut short for
-    want of time, cancelled, or about a stream that was declared before the recording.
+    want of time, cancelled, or about a stream that was declared before the recording. Published
+    wrenches that the service has skipped have no answers.
 
     Parameters
     ----------
@@ -71,9 +72,9 @@ class Replay:
 
     Attributes
     ----------
-    equal, moved, near, left_out : int
+    equal, moved, near, left_out, skipped : int
         Number of answers that are equal, that have moved, of set-points that differ within their
-        proven gaps, and of questions that are not asked.
+        proven gaps, of questions that are not asked, and of wrenches that the service has skipped.
     asked : Counter
         Number of questions that were asked, by kind.
     fields : dict
@@ -92,6 +93,7 @@ class Replay:
     moved: int = 0
     near: int = 0
     left_out: int = 0
+    skipped: int = 0
     asked: Counter[str] = field(default_factory=Counter)
     fields: dict[tuple[str, str], Moved] = field(default_factory=dict)
 
@@ -119,6 +121,9 @@ class Replay:
         """
         try:
             for recorded in questions:
+                if recorded.about.status == "skipped":
+                    self.skipped += 1
+                    continue
                 if self._depends_on_more(recorded):
                     self.left_out += 1
                     continue

@@ -240,9 +240,9 @@ def _is_loopback(endpoint: str) -> bool:
 def start_zenoh_log() -> None:
     """Start zenoh's log on standard error: errors, or the levels in the variable ``RUST_LOG``.
 
-    The log has colours on a terminal alone. Zenoh writes it to file descriptor 1, standard output, which is for results. Descriptor 1
+    Zenoh writes its log to file descriptor 1, standard output, which is for results. Descriptor 1
     therefore becomes a copy of standard error, and `sys.stdout` writes to the original standard
-    output.
+    output. The log has colours on a terminal alone.
     """
     sys.stdout.flush()
     standard_output, standard_error = 1, 2

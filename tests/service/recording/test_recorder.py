@@ -205,7 +205,9 @@ def test_a_damaged_bit_is_never_read_as_what_was_recorded(tmp_path, monkeypatch,
     data = path.read_bytes()
     recorder.close()
     before, rng = recorded(path), np.random.default_rng(0)
-    lost = 0
+    whole = Recording(path)
+    list(whole.questions())
+    chunks, lost = whole.chunks, 0
     for place in rng.integers(len(data), size=400).tolist():
         damaged = bytearray(data)
         damaged[place] ^= 1 << int(rng.integers(8))
@@ -220,6 +222,8 @@ def test_a_damaged_bit_is_never_read_as_what_was_recorded(tmp_path, monkeypatch,
             lost += 1
             # of a file that is not closed, nothing says how many chunks there should be
             assert recording.damaged or recording.whole is False
+            if closed and recording.whole:
+                assert recording.damaged < recording.chunks == chunks
     assert lost > 100
 
 

@@ -7,10 +7,12 @@ import pytest
 
 from hand_models.base import InvalidInputError
 from service.answering import Streams, handle, read_hand
+from service.operating import print_replay, replay_json
 from service.recording import Exchange, Recorder, Recording, Replay
 from service.recording.differences import differences, same_within_gaps
 from service.replies import ErrorReply, PublishedReply
 from service.requests import LONGEST_DEADLINE
+from service.tables import console
 from service.wire import Answer, Format, encode_error
 from service.wire.errors import BusyError
 from tests.suite.helpers.requests import stream_request, wall_request
@@ -76,6 +78,20 @@ def test_what_depends_on_more_than_the_question_is_left_out(tmp_path):
     ask.add(PLAN, payload, Format.JSON, Answer(late, "application/json;crux.PlanReply@1"))
     replay = ask.replayed()
     assert (replay.equal, replay.moved, replay.left_out) == (0, 0, 3)
+
+
+def test_wrenches_that_were_skipped_are_counted_apart(tmp_path, capsys):
+    ask = Asked(tmp_path / "a.mcap")
+    stream = ask(STREAM, stream_request())["stream"]
+    wrench = msgspec.json.encode({"v": 1, "number": 0, "time": 0.0, "body_wrench": WRENCH})
+    for _ in range(3):
+        key = f"{STREAM}/{stream}/wrench"
+        ask.recorder.add(Exchange(key, 0.0, Format.JSON.value, wrench, None))
+    replay = ask.replayed()
+    assert (replay.equal, replay.left_out, replay.skipped) == (1, 0, 3)
+    assert replay_json(replay)["skipped"] == 3
+    print_replay(replay, console())
+    assert "3 skipped by the service for newer wrenches" in capsys.readouterr().out
 
 
 def test_errors_of_published_wrenches_are_equal(tmp_path):
