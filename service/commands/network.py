@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import planner
+from hand_models import hand
 from hand_models.base import InvalidInputError
-from hand_models.hand import closing_is_compiled
 from service import (
     operating,
     recording,
@@ -221,7 +221,7 @@ def serve_command(
         if rivals := service.rivals():
             tables.note(rivals)
         where = ", ".join(endpoints) or "no address"
-        compiled = closing_is_compiled()
+        compiled = hand.closing_is_compiled()
         start = "takes some seconds" if compiled else "compiles for minutes, once per installation"
         tables.remark(f"listening on {where}; the start of the workers {start}")
         with service:
