@@ -10,3 +10,4 @@ from .outcome import (
 )
 from .raising import raises as raises
 from .routing import ClimbStep as ClimbStep, RouteMaker as RouteMaker
+from .stepping import Stepping as Stepping

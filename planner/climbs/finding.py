@@ -5,20 +5,22 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 
 from hand_models.base import InvalidInputError
 from planner import deadline
-from planner.climbs.found_climb import FoundClimb
+from planner.climbs.found_climb import FoundClimb, deciding_stage, with_joints
 from planner.climbs.move_checks import MoveChecks
 from planner.climbs.other_bodies import detours
-from planner.climbs.outcome import ClimbStatus, DecidingStage, Raise, RefusedMoves
+from planner.climbs.outcome import ClimbStatus, Raise, RefusedMoves
 from planner.climbs.postures import PostureChoice, Postures, Swung
 from planner.climbs.raising import raises
 from planner.climbs.routing import ClimbStep, RouteMaker
+from planner.climbs.settings import StepSettings
+from planner.climbs.stepping import Stepping
 from planner.deadline import DeadlineError
 from planner.question import Limits, Objective, Question
 from planner.route import (
@@ -26,7 +28,6 @@ from planner.route import (
     ClimbSettings,
     Failure,
     KnotPhase,
-    Route,
     RouteResult,
     evaluate,
     plan_climb,
@@ -41,7 +42,7 @@ class ClimbProgress(NamedTuple):
 
     Attributes
     ----------
-    phase : {'search', 'moves', 'stages', 'changes'}
+    phase : {'search', 'steps', 'moves', 'stages', 'changes'}
     best, bound : float or None
         Least load factor of the best climb so far, and the bound of all.
     seconds : float
@@ -74,9 +75,10 @@ def find_climb(
 ) -> FoundClimb:
     """Find the climb of a wall with the largest least load factor that can be executed.
 
-    The search finds states; their moves are planned whole. A move that has no plan is left out of
-    the next search, until a climb has a plan from end to end, the time is over, or no states are
-    left. The bound is that of all states, whether their moves have plans or not.
+    Between heights or points a first climb is looked for step by step. The search finds states;
+    their moves are planned whole. A move that has no plan is left out of the next search, until a
+    climb has a plan from end to end, the time is over, or no states are left. The bound is that of
+    all states, whether their moves have plans or not.
 
     Parameters
     ----------
@@ -161,7 +163,9 @@ class _Finder:
         # below one, the hands do not hold the robot at all
         self._floor = 1.0
         self._begun = time.perf_counter()
-        self._seconds = dict.fromkeys(("search", "postures", "moves", "stages", "changes"), 0.0)
+        self._seconds = dict.fromkeys(
+            ("search", "steps", "postures", "moves", "stages", "changes"), 0.0
+        )
         self._before: Climb | None = None
         self._began: object = None
         self._checks = MoveChecks(maker.wall, maker.limits)
@@ -171,7 +175,11 @@ class _Finder:
         """Search and plan until the climb is good enough, nothing is left, or the time is over."""
         # the first search bounds all climbs; in the next one moves are planned as climbs are found
         found = self._search(start, goal, within, at_least, 0.3)
-        if found.states and not deadline.expired():
+        if found.states and not deadline.expired() and None in (start.members, goal.members):
+            # from one stance to another there are few climbs, and the search finds the best
+            self._step((start, goal), max(self._floor, at_least or 0.0))
+        done = self._best is not None and self._good(within, at_least)
+        if found.states and not done and not deadline.expired():
             self._asks = True
             found = self._search(start, goal, within, at_least, 1.0)
         return self._answer(found, within, at_least)
@@ -228,14 +236,40 @@ class _Finder:
         self._seconds["moves"] += time.perf_counter() - begun
         if failed or tried.climb is None:
             return blocked
+        self._keep(ClimbStep.each(states), tried.climb)
+        return set()
+
+    def _keep(self, steps: list[ClimbStep], climb: Climb) -> None:
+        """Plan the stages of a climb, and keep it if it is the best."""
         begun = time.perf_counter()
         self._report("stages")
-        result = evaluate(tried.climb.route, workers=1, climb=tried.climb)
+        result = evaluate(climb.route, workers=1, climb=climb)
         self._seconds["stages"] += time.perf_counter() - begun
-        planned = _Planned(ClimbStep.each(states), tried.climb, result)
+        planned = _Planned(steps, climb, result)
         if self._best is None or planned.least > self._best.least:
             self._best = planned
-        return set()
+
+    def _step(self, ends: tuple[Ends, Ends], least: float) -> None:
+        """Look for a first climb step by step."""
+        begun, left, settings = time.perf_counter(), deadline.left(), StepSettings()
+        with (
+            suppress(DeadlineError),
+            deadline.within(None if left is None else settings.time * left),
+        ):
+            stepping = Stepping(self._checks, ends, self._memory, least)
+            for _ in range(settings.plans):
+                self._report("steps")
+                found = stepping.find()
+                if found is None:
+                    break
+                steps = ClimbStep.each(found.states)
+                tried = self._plan(steps, found.choice)
+                if tried.climb is not None and tried.failure is None:
+                    self._keep(steps, tried.climb)
+                    break
+                self._refusal(tried, steps)
+                stepping.refuse(found, tried.failures[0])
+        self._seconds["steps"] += time.perf_counter() - begun
 
     def _climb(self, states: Sequence[State]) -> _Tried:
         """Choose postures for states, and plan the moves."""
@@ -311,7 +345,7 @@ class _Finder:
             status = "none" if self._bound <= at_least else "unknown"
         begun = time.perf_counter()
         self._report("changes")
-        deciding, state = _deciding(best, wall)
+        deciding, state = deciding_stage(best.steps, best.result, wall)
         changes: tuple[tuple[Raise, Question], ...] = ()
         if deciding is not None and not deadline.expired():
             stage = best.result.stages[deciding.stage].question
@@ -323,7 +357,7 @@ class _Finder:
             found=found,
             bound=self._bound,
             least=best.result.load_factor,
-            route=_with_joints(best.climb),
+            route=with_joints(best.climb),
             climb=best.climb,
             result=best.result,
             deciding=deciding,
@@ -358,42 +392,3 @@ def _nothing() -> Found:
         seconds=0.0,
         finished=False,
     )
-
-
-def _with_joints(climb: Climb) -> Route:
-    """Return the route of a climb with the joint angles that it has at the start and on holds."""
-    route, stages = climb.route, climb.stage_joints
-    placed = [climb.held[i + 1].posed.angles for i in range(len(route.moves))]
-    return replace(
-        route,
-        start=replace(route.start, joints=stages[0]),
-        moves=tuple(
-            replace(move, joints={move.hand.limb: angles[move.hand.limb]})
-            for move, angles in zip(route.moves, placed, strict=True)
-        ),
-    )
-
-
-def _deciding(best: _Planned, wall: Wall) -> tuple[DecidingStage | None, State]:
-    """Return the stage with the least load factor, and its state."""
-    states = [best.steps[0].shifts[0]]
-    for step in best.steps:
-        states += [step.shifts[-1]] * (len(step.shifts) > 1)
-        states += [state for state in (step.lift, step.place) if state is not None]
-    plans = best.result.plans
-    factors = [np.inf if p.load_factor is None else p.load_factor for p in plans]
-    i = int(np.argmin(factors))
-    if not np.isfinite(factors[i]):
-        return None, states[i]
-    stage, state = best.result.stages[i], states[i]
-    placed = zip(wall.robot.limbs, state.members, strict=True)
-    return DecidingStage(
-        stage=i,
-        move=stage.move,
-        phase=stage.phase,
-        limb=stage.limb,
-        load_factor=factors[i],
-        limiting=plans[i].limiting,
-        placements={limb: p for limb, p in placed if p >= 0},
-        body=state.body,
-    ), state

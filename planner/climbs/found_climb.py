@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from planner.climbs.outcome import ClimbStatus, DecidingStage, Raise, RefusedMoves
+from planner.climbs.routing import ClimbStep
 from planner.question import Question
 from planner.route import Climb, Route, RouteResult
-from planner.search import Found, Wall
+from planner.search import Found, State, Wall
 
-__all__ = ["FoundClimb"]
+__all__ = ["FoundClimb", "deciding_stage", "with_joints"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -75,3 +79,52 @@ class FoundClimb:
             f"({len(wall.bodies)}), hands with fixed wrists and joints as the reach table has them "
             "(what inverse kinematics did not find is left out), without limits of joint torques"
         )
+
+
+def with_joints(climb: Climb) -> Route:
+    """Return the route of a climb with the joint angles that it has at the start and on holds."""
+    route, stages = climb.route, climb.stage_joints
+    placed = [climb.held[i + 1].posed.angles for i in range(len(route.moves))]
+    return replace(
+        route,
+        start=replace(route.start, joints=stages[0]),
+        moves=tuple(
+            replace(move, joints={move.hand.limb: angles[move.hand.limb]})
+            for move, angles in zip(route.moves, placed, strict=True)
+        ),
+    )
+
+
+def deciding_stage(
+    steps: Sequence[ClimbStep], result: RouteResult, wall: Wall
+) -> tuple[DecidingStage | None, State]:
+    """Return the stage of a climb with the least load factor, and its state.
+
+    Parameters
+    ----------
+    steps : sequence of ClimbStep
+    result : RouteResult
+        Plans of its stages.
+    wall : Wall
+    """
+    states = [steps[0].shifts[0]]
+    for step in steps:
+        states += [step.shifts[-1]] * (len(step.shifts) > 1)
+        states += [state for state in (step.lift, step.place) if state is not None]
+    plans = result.plans
+    factors = [np.inf if p.load_factor is None else p.load_factor for p in plans]
+    i = int(np.argmin(factors))
+    if not np.isfinite(factors[i]):
+        return None, states[i]
+    stage, state = result.stages[i], states[i]
+    placed = zip(wall.robot.limbs, state.members, strict=True)
+    return DecidingStage(
+        stage=i,
+        move=stage.move,
+        phase=stage.phase,
+        limb=stage.limb,
+        load_factor=factors[i],
+        limiting=plans[i].limiting,
+        placements={limb: p for limb, p in placed if p >= 0},
+        body=state.body,
+    ), state

@@ -63,7 +63,7 @@ class MoveChecks:
             if before not in self._fits:
                 clear = next(self._clear(before), None) is not None
                 # what four hands hold is seen to where one of them lifts
-                self._fits[before] = clear and (-1 not in before.members or self._borne(before))
+                self._fits[before] = clear and (-1 not in before.members or self.borne(before))
             return self._fits[before] and not self._meeting(before)
         if before.body != after.body:
             ends = min(before.body, after.body), max(before.body, after.body)
@@ -106,7 +106,7 @@ class MoveChecks:
         for each in ends or [pair]:
             self._lost.setdefault(each, set()).add((limb, place))
 
-    def _borne(self, state: State, more: Array | None = None) -> bool:
+    def borne(self, state: State, more: Array | None = None) -> bool:
         """Return whether limbs keep clear of each other at joint angles that bear the loads.
 
         ``more`` is as of `JointLoadPrograms.share`.
@@ -170,7 +170,7 @@ class MoveChecks:
         # the limb is in the air, and where its placement is
         more = -own
         more[3:] += screening.moments[whole.body, limb, members[limb]]
-        return self._borne(lift, more) and self._borne(whole)
+        return self.borne(lift, more) and self.borne(whole)
 
     def closed_wrench(self, place: int) -> Array | None:
         """Return the rock's wrench on a closed hand without load, (6,); None if it cannot close."""

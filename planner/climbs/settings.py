@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["PostureSettings"]
+__all__ = ["PostureSettings", "StepSettings"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,3 +28,31 @@ class PostureSettings:
     """Choices of joint angles whose moves are planned for one climb, at most."""
     tries: int = 1500
     """Ways that are tried for one climb at most; where a climb has a choice, a hundred do."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepSettings:
+    """Numbers of the search for a first climb step by step, which set the order of its steps."""
+
+    shift: float = 0.3
+    """Part of a move that a shift of the body counts [1]."""
+    visit: float = 0.2
+    """What a lift is put back by each time it was made [moves], so that others are tried, too."""
+    failure: float = 0.5
+    """What a lift is put back by each time its limb could not let go [moves]."""
+    no_place: float = 0.15
+    """What it is put back by each time its limb could not be placed [moves]."""
+    start: float = 0.6
+    """What a lift from the start is put back by each time [moves]."""
+    stances: int = 6
+    """Stances of the start that are looked at for each lift: those that may hold most."""
+    ways: int = 3
+    """Postures of a state at most, and joint angles of a limb on a hold."""
+    out: int = 64
+    """Lifts that were ruled out from which on moves are counted anew."""
+    steps: int = 2000
+    """Steps between two counts of moves, which take seconds."""
+    time: float = 0.5
+    """Part of the time that is left which it may take [1]."""
+    plans: int = 40
+    """Climbs whose moves are planned, at most."""

@@ -1,5 +1,7 @@
 from .certify import climb_certificate as climb_certificate
 from .found import Found as Found, Proof as Proof
+from .lifts import Ground as Ground, Lifts as Lifts
+from .programs import Programs as Programs, SolvedStates as SolvedStates
 from .searching import (
     SearchMemory as SearchMemory,
     SearchProgress as SearchProgress,

@@ -64,8 +64,13 @@ def hash_table(keys: Indices) -> tuple[Indices, Indices]:
 
 
 @compiled()
-def _flood(reached: Indices, near: Indices, body: int, found: Indices, stack: Indices) -> None:
-    """Write the mask of the bodies that shifts connect with a body, among those reached."""
+def _flood(
+    reached: Indices, near: Indices, once: int, body: int, found: Indices, stack: Indices
+) -> None:
+    """Write the mask of the bodies that shifts connect with a body, among those reached.
+
+    With ``once`` not zero, one shift at most.
+    """
     found[:] = 0
     found[body // 62] |= 1 << (body % 62)
     stack[0], height = body, 1
@@ -75,14 +80,14 @@ def _flood(reached: Indices, near: Indices, body: int, found: Indices, stack: In
         for w in range(len(found)):
             new = near[at, w] & reached[w] & ~found[w]
             found[w] |= new
-            while new != 0:
+            while new != 0 and once == 0:
                 low = new & -new
                 stack[height] = 62 * w + math.frexp(float(low))[1] - 1
                 height += 1
                 new ^= low
 
 
-@compiled("i1", "i1", "i2", "i2", "i3", "i1")
+@compiled("i1", "i1", "i2", "i2", "i3", "i1", "i0")
 def touching(
     bodies: Indices,
     triples: Indices,
@@ -90,6 +95,7 @@ def touching(
     near: Indices,
     reach: Indices,
     end: Indices,
+    once: int,
 ) -> NDArray[np.bool_]:
     """Return which lifts (n,) shifts might connect with the bodies of an end, a mask (W,)."""
     words, limbs = near.shape[1], members.shape[1]
@@ -103,7 +109,7 @@ def touching(
             if p >= 0:
                 for w in range(words):
                     reached[w] &= reach[p, limb, w]
-        _flood(reached, near, bodies[i], found, stack)
+        _flood(reached, near, once, bodies[i], found, stack)
         for w in range(words):
             if found[w] & end[w] != 0:
                 touched[i] = True
@@ -170,7 +176,7 @@ def rule_out(
 
 @compiled(
     LIFT_NODE, "i1", "i1", "i2", "i1", "i1", "i1", "i2", "i3", "i1", "i1", "b2", "i2", "i2",
-    "f2", "f2", "f2", "f4", "f1", "f0", "i1", "i0",
+    "f2", "f2", "f2", "f4", "f1", "f0", "i1", "i0", "i0",
 )  # fmt: skip
 def expand(
     nodes: NDArray[np.void],
@@ -195,6 +201,7 @@ def expand(
     multiple: float,
     chosen: Indices,
     side: int,
+    once: int,
 ) -> tuple[Indices, Indices]:
     """Look at the neighbours of lifts: claim those that are open, and list those that are closed.
 
@@ -231,6 +238,8 @@ def expand(
         Lifts to look at.
     side : int
         End for which neighbours are claimed, 1 or 2; 0 to claim none.
+    once : int
+        1 if the body is shifted once at most between two lifts, 0 if as often as it takes.
 
     Returns
     -------
@@ -291,7 +300,7 @@ def expand(
                 continue
             for w in range(words):
                 reached[w] = three[w] & reach[p, free, w]
-            _flood(reached, near, body, found, stack)
+            _flood(reached, near, once, body, found, stack)
             own[free] = p
             for end in range(2):
                 touched = False

@@ -28,6 +28,8 @@ class Ground:
     wall : Wall
     ends : tuple of Ends
         Start and goal.
+    once : bool, optional
+        Whether the body is shifted once at most between two lifts; as often as it takes by default.
 
     Attributes
     ----------
@@ -51,8 +53,8 @@ class Ground:
         Mean of the ``hops`` of the bodies from which limbs reach placements.
     """
 
-    def __init__(self, wall: Wall, ends: tuple[Ends, Ends]) -> None:
-        self.wall, self.ends = wall, ends
+    def __init__(self, wall: Wall, ends: tuple[Ends, Ends], once: bool = False) -> None:
+        self.wall, self.ends, self.once = wall, ends, once
         self.reached = reached = wall.reach.reached
         count, bodies, limbs = reached.shape
         self.beside = np.zeros((bodies, bodies), dtype=bool)
@@ -270,6 +272,7 @@ class Lifts:
             self.multiple * (1.0 - 0.1 * SEARCH_SETTINGS.exact),
             np.ascontiguousarray(chosen),
             side,
+            int(ground.once),
         )
 
     def find(self, bodies: Indices, members: Indices) -> tuple[Indices, Indices]:
@@ -301,7 +304,7 @@ class Lifts:
         fixed = ground.fixed[end]
         touched = touching(
             self.bodies, self.triples, self.members, ground.near, ground.reach,
-            ground.end_masks[end],
+            ground.end_masks[end], int(ground.once),
         )  # fmt: skip
         fits = (self.members < 0) | (fixed < 0) | (self.members == fixed)
         found: Indices = np.flatnonzero(touched & fits.all(axis=1)[self.triples])
