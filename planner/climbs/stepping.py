@@ -32,10 +32,10 @@ __all__ = ["Stepping"]
 
 
 class _Lift(NamedTuple):
-    """A limb that is to let go; from the start, a lift of the wall by its index."""
+    """A lift by its index that is to be made, from a posture or from the start."""
 
     posture: ClimbPosture | None
-    limb: int
+    lift: int
 
 
 class _Step(NamedTuple):
@@ -218,11 +218,8 @@ class Stepping:
     def _left_of(self, step: _Lift | _Step) -> float:
         """Return how many moves are left before a lift, or after a step."""
         if isinstance(step, _Lift):
-            lift = step.limb
-            if step.posture is not None:
-                lift = self._lift_of(step.posture.state, step.limb)
-            out = self._lifts.nodes["out"][lift] != 0
-            return np.inf if out else float(1.0 + self._left[lift] + self._back[lift])
+            out = self._lifts.nodes["out"][step.lift] != 0
+            return np.inf if out else float(1.0 + self._left[step.lift] + self._back[step.lift])
         body, members = step.state
         if step.posture is not None and step.limb < 0:
             # it comes from a shift
@@ -244,32 +241,28 @@ class Stepping:
 
     def _after(self, step: _Lift) -> Iterator[tuple[float, _Step]]:
         """Yield what a lift leads to: stances at the start, or other placements of the limb."""
-        posture, settings = step.posture, self._settings
-        if posture is None:
-            state = self._state(step.limb)
-            if self._stands(step.limb):
-                self._back[step.limb] += settings.start
-                limb, left = state.members.index(-1), self._left_of(step) - settings.start
-                stances = self._four(state.body, np.array(state.members), limb)
-                asked = StanceIndices(np.full(len(stances), state.body), stances)
-                best = np.argsort(-self._wall.screening.bounds(asked), kind="stable")
-                for row in stances[best[: settings.stances]].tolist():
-                    yield left, _Step(None, State(state.body, tuple(row)))
-            return
-        body, members = posture.state
-        lift = self._lift_of(posture.state, step.limb)
+        posture, lift, settings = step.posture, step.lift, self._settings
         if not self._stands(lift):
             return
-        if (*posture.key, step.limb) in self._refused or self._steps.off(
-            posture, step.limb
-        ) is None:
+        state = self._state(lift)
+        limb = state.members.index(-1)
+        if posture is None:
+            left = self._left_of(step)
+            self._back[lift] += settings.start
+            stances = self._four(state.body, np.array(state.members), limb)
+            asked = StanceIndices(np.full(len(stances), state.body), stances)
+            best = np.argsort(-self._wall.screening.bounds(asked), kind="stable")
+            for row in stances[best[: settings.stances]].tolist():
+                yield left, _Step(None, State(state.body, tuple(row)))
+            return
+        if (*posture.key, limb) in self._refused or self._steps.off(posture, limb) is None:
             self._back[lift] += settings.failure
             return
         self._back[lift] += settings.visit
-        stances = self._four(body, np.array(members), step.limb)
-        every = self._from(body, stances, self._open(posture, step.limb))
+        stances = self._four(state.body, np.array(posture.state.members), limb)
+        every = self._from(state.body, stances, self._open(posture, limb))
         for row, far in zip(stances.tolist(), every.tolist(), strict=True):
-            yield far, _Step(posture, State(body, tuple(row)), step.limb)
+            yield far, _Step(posture, State(state.body, tuple(row)), limb)
 
     def _taken(self, step: _Step) -> Iterator[ClimbPosture]:
         """Yield the postures to which a step leads."""
@@ -291,7 +284,7 @@ class Stepping:
         for limb in range(len(posture.angles)):
             lift = self._lift_of(posture.state, limb)
             if lift >= 0:
-                step = _Lift(posture, limb)
+                step = _Lift(posture, lift)
                 yield self._left_of(step), step
         body, members = posture.state
         limbs = np.arange(len(members))
