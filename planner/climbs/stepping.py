@@ -244,7 +244,7 @@ class Stepping:
         posture, lift, settings = step.posture, step.lift, self._settings
         if not self._stands(lift):
             return
-        state = self._state(lift)
+        state = self._lifts.state(lift)
         limb = state.members.index(-1)
         if posture is None:
             left = self._left_of(step)
@@ -328,15 +328,11 @@ class Stepping:
         """Return whether three hands hold a lift, at joint angles that bear it."""
         if lift not in self._stood:
             good = len(self._holding(np.array([lift]))) > 0
-            if good and not self._checks.borne(self._state(lift)):
+            if good and not self._checks.borne(self._lifts.state(lift)):
                 self._lifts.nodes["out"][lift], good = 1, False
             self._stood[lift] = good
             self._out += not good
         return self._stood[lift]
-
-    def _state(self, lift: int) -> State:
-        row = self._lifts.members[self._lifts.triples[lift]]
-        return State(int(self._lifts.bodies[lift]), tuple(row.tolist()))
 
     def _lift_of(self, state: State, limb: int) -> int:
         body, members = with_lift(state, limb)

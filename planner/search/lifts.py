@@ -213,6 +213,11 @@ class Lifts:
     def __len__(self) -> int:
         return len(self.bodies)
 
+    def state(self, lift: int) -> State:
+        """Return the state of a lift."""
+        row = self.members[self.triples[lift]]
+        return State(int(self.bodies[lift]), tuple(row.tolist()))
+
     def rule_out(self, triples: Indices, directions: Array, held: Array) -> int:
         """Rule out lifts of triples by directions and the sums of supports in them, one each."""
         from planner.search.compiled_graph import rule_out

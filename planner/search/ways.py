@@ -228,8 +228,7 @@ class Ways:
 
     def state(self, lift: int) -> State:
         """Return the state of a lift."""
-        row = self._lifts.members[self._lifts.triples[lift]]
-        return State(int(self._lifts.bodies[lift]), tuple(row.tolist()))
+        return self._lifts.state(lift)
 
     def _ends_of(self, way: Way) -> list[State]:
         """Return the first and the last stance of a shift between two lifts."""
