@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, Pose
+from hand_models.base import Array
 from planner.climbs.holds import Stay
 from planner.climbs.joint_loads import LimbLoads
 from planner.climbs.move_checks import MoveChecks
 from planner.climbs.postures import PostureChoice
-from planner.motion import BranchEndError, follow_poses, pose_between, straight_off
+from planner.motion import BranchEndError, follow_poses, straight_off
 from planner.robots import scene_number
 from planner.search import State
 
@@ -244,20 +244,13 @@ class StepChecks:
             if other != limb
         )
 
-    def _path(self, body: int, other: int) -> list[Pose]:
-        """Return the poses of the body on a shift, without the first."""
-        first, last = self._wall.bodies[body], self._wall.bodies[other]
-        away = float(np.linalg.norm(last.position - first.position))
-        pieces = 2 * max(int(np.ceil(0.5 * away / self._checks.settings.step)), 1)
-        between = [pose_between(first, last, k / pieces) for k in range(1, pieces)]
-        return [*between, last]
-
     def _follow(self, posture: ClimbPosture, limb: int, other: int) -> Array | None:
         """Return the joint angles (m, n) of a limb in a shift [rad]; None if it cannot follow."""
         body, place = posture.state.body, posture.state.members[limb]
         key = limb, place, body, other, posture.angles[limb].tobytes()
         if key not in self._followed:
-            path, hand, found = self._path(body, other), self._wall.places[place].pose, None
+            path = self._checks.ways.path(Stay(limb, place, (body, other)))[0][1:]
+            hand, found = self._wall.places[place].pose, None
             at = [each.inverse() @ hand for each in path]
             try:
                 way = follow_poses(self._wall.robot, self._names[limb], posture.angles[limb], at)
