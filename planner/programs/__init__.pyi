@@ -14,7 +14,7 @@ from .conic import (
     Outcome as Outcome,
     Reached as Reached,
 )
-from .dual_active_set import active_rows_near as active_rows_near
+from .dual_active_set import dual_optimum as dual_optimum
 from .dual_bounds import (
     convex_bound as convex_bound,
     hazard_bound as hazard_bound,
@@ -24,7 +24,6 @@ from .dual_bounds import (
     unproven_sentences as unproven_sentences,
 )
 from .hazard import Hazard as Hazard, TilePowers as TilePowers
-from .load_bounds import LOAD_BOX as LOAD_BOX, load_box as load_box
 from .program import (
     TIE_WEIGHT as TIE_WEIGHT,
     Elastic as Elastic,
@@ -39,12 +38,14 @@ from .robust import (
 from .scaled_rows import (
     JOINT_FORCE as JOINT_FORCE,
     JOINT_TORQUE as JOINT_TORQUE,
+    LOAD_BOX as LOAD_BOX,
     LOAD_UNIT as LOAD_UNIT,
     TWIST_UNIT as TWIST_UNIT,
     WRENCH_UNIT as WRENCH_UNIT,
     WRIST_RANGE as WRIST_RANGE,
     ScaledRows as ScaledRows,
     is_effort as is_effort,
+    load_box as load_box,
 )
 from .set_points import (
     SET_POINT_SETTINGS as SET_POINT_SETTINGS,

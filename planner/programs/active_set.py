@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -240,18 +240,47 @@ class ActiveFace:
         )
 
 
+class Face(Protocol):
+    """The points at which a set of rows is active.
+
+    Attributes
+    ----------
+    active : ndarray of bool, shape (k,)
+        Mask of the active rows.
+    Q : ndarray, shape (M,)
+        Diagonal of the curvature at a weight of 1.
+    """
+
+    @property
+    def active(self) -> Mask: ...
+
+    @property
+    def Q(self) -> Array: ...
+
+    def keeps(self, least: Point, weight: float) -> bool:
+        """Return whether the least point of the face remains the optimum at another weight.
+
+        Parameters
+        ----------
+        least : Point
+            Least point of the face at a weight of 1.
+        weight : float
+            The other weight of the quadratic term.
+        """
+
+
 class Optimum(NamedTuple):
     """An optimum, and the face of active rows of which it is the least point."""
 
     point: Point
-    face: ActiveFace
+    face: Face
 
 
 def optimum(
     rows: Rows,
     Q: Array,
     start: Point,
-    first: Mask | ActiveFace,
+    first: Mask | Face,
     rounds: int,
     weight: float = 1.0,
     *,
@@ -267,7 +296,7 @@ def optimum(
         Diagonal of the curvature at a weight of 1.
     start : Point
         A point that is nearly feasible, or any point if ``first`` are the optimum's active rows.
-    first : ndarray of bool, shape (k,), or ActiveFace
+    first : ndarray of bool, shape (k,), or Face
         The rows that are active at first.
     rounds : int
         Largest number of sets of active rows that are tried.
@@ -287,7 +316,7 @@ def optimum(
         If active rows have no common point.
     """
     face = first if isinstance(first, ActiveFace) else None
-    active = first.active.copy() if isinstance(first, ActiveFace) else first.copy()
+    active = first.copy() if isinstance(first, np.ndarray) else first.active.copy()
     z, u, multipliers = start.z, start.u, np.where(active, start.multipliers, 0.0)
     for taken in range(rounds):
         if face is None:

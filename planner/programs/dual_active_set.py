@@ -12,21 +12,30 @@ In scaled loads x = Q^½ z and with rows F of unit length, multipliers λ and u 
     [ 0  dᵀ ] [ u ]   [  1 ]
     [ d  S  ] [ λ ] = [ −b ] ,   S = F Fᵀ,   x = −Fᵀ λ.
 
-The inverse of this matrix is kept, and changed by one row at a time.
+The inverse of this matrix is kept, and changed by one row at a time. The method is compiled
+(`planner.programs.compiled_dual`).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, Indices
-from planner.programs.active_set import TOLERANCES, Mask, Rows
+from planner.programs.active_set import (
+    TOLERANCES,
+    ApartError,
+    Mask,
+    Optimum,
+    Point,
+    Rows,
+    optimum,
+)
 
-__all__ = ["active_rows_near"]
+__all__ = ["DualFace", "dual_optimum"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,13 +48,52 @@ class DualSettings:
     starts: int = 4  # from which all rows with negative multipliers are dropped at once
     changes: int = 32
     """Rows that come or go at most: with more, a program is sooner solved anew."""
+    met: float = 1e-10  # of the equations of active rows, scaled, and of dᵀ λ = 1
 
 
 DUAL_SETTINGS: Final = DualSettings()
 
 
-def active_rows_near(rows: Rows, Q: Array, guess: Mask, multipliers: Array) -> Mask | None:
-    """Return the active rows of a quadratic program, sought from a guess.
+class DualFace(NamedTuple):
+    """The points at which k of a stance's rows are active, as the dual method leaves them.
+
+    Attributes
+    ----------
+    rows : Rows
+        All rows of the stance.
+    Q : ndarray, shape (M,)
+        Diagonal of the curvature at a weight of 1.
+    active : ndarray of bool
+        Mask of the active rows.
+    at : ndarray of int, shape (k,)
+        Indices of the active rows, the equations first.
+    inverse : ndarray, shape (k + 1, k + 1)
+        Inverse of [[0, dᵀ], [d, C Q⁻¹ Cᵀ]] of the active rows.
+    """
+
+    rows: Rows
+    Q: Array
+    active: Mask
+    at: Indices
+    inverse: Array
+
+    def keeps(self, least: Point, weight: float) -> bool:
+        """Return whether the least point of the face remains the optimum at another weight.
+
+        Parameters and reason as of `ActiveFace.keeps`.
+        """
+        C, multipliers = self.rows.C[self.at], least.multipliers[self.at]
+        for _ in range(3):
+            missing = weight * self.Q * least.z + multipliers @ C
+            if math.sqrt(missing.dot(missing)) <= TOLERANCES.stationarity * weight:
+                signed = multipliers[self.rows.equations :]
+                return bool(signed.min(initial=0.0) >= -TOLERANCES.multiplier * weight)
+            multipliers = multipliers - self.inverse[1:, 1:] @ (C @ (missing / self.Q))
+        return False
+
+
+def dual_optimum(rows: Rows, Q: Array, start: Point, guess: Mask) -> Optimum | None:
+    """Solve a quadratic program of a stance by the dual method, from a guess of its active rows.
 
     Parameters
     ----------
@@ -53,122 +101,32 @@ def active_rows_near(rows: Rows, Q: Array, guess: Mask, multipliers: Array) -> M
         All rows of the stance.
     Q : ndarray, shape (M,)
         Diagonal of the curvature.
+    start : Point
+        Point near the optimum. Of rows that depend on each other, those with the largest
+        multipliers count.
     guess : ndarray of bool, shape (k,)
         Rows that may be active, the equations among them.
-    multipliers : ndarray, shape (k,)
-        Multipliers near those of the optimum: of rows that depend on each other, those with the
-        largest count.
 
     Returns
     -------
-    ndarray of bool, shape (k,), or None
+    Optimum or None
         None if too many rows would have to change, or rounding is in the way.
     """
-    F = rows.C / np.sqrt(Q)
-    size = np.sqrt(np.einsum("ij,ij->i", F, F))
-    # rows of nothing bind nothing
-    counts = size > 0.0
-    if not (counts[: rows.equations].all() and rows.d.any()):
+    from planner.programs.compiled_dual import optimum_near
+
+    own = DUAL_SETTINGS
+    tolerances, most = (TOLERANCES.row, own.dependent, own.multiplier), (own.starts, own.changes)
+    exact, at, z, u, multipliers, inverse = optimum_near(
+        *rows, Q, guess, start.multipliers, *tolerances, *most, own.met
+    )
+    if not len(at):
         return None
-    size[~counts] = 1.0
-    F /= size[:, None]
-    d, b = rows.d / size, rows.b / size
-    whole = 1.0 / float(d.max())
-    d *= whole
+    active = np.zeros(len(rows.b), dtype=bool)
+    active[at] = True
+    if exact and multipliers[rows.equations :].min() >= -TOLERANCES.multiplier:
+        return Optimum(Point(z, u, multipliers), DualFace(rows, Q, active, at, inverse))
     try:
-        at, inverse = _first(F, d, b, whole, guess & counts, multipliers * size, rows.equations)
-    except np.linalg.LinAlgError:
+        # by rounding a row more or less
+        return optimum(rows, Q, start, active, 3)
+    except ApartError:
         return None
-    found = inverse @ np.concatenate(([whole], -b[at]))
-    changes = 0
-    while True:
-        room = b + d * found[0] + F @ (found[1:] @ F[at])
-        room *= size
-        room[at], room[~counts] = 0.0, 0.0
-        row = int(room.argmin())
-        if room[row] >= -TOLERANCES.row:
-            active = np.zeros(len(F), dtype=bool)
-            active[at] = True
-            return active
-        multiplier, entering = 0.0, True
-        while entering:
-            changes += 1
-            if changes > DUAL_SETTINGS.changes:
-                return None
-            column = np.concatenate(([d[row]], F[at] @ F[row]))
-            slopes = -(inverse @ column)
-            rise = 1.0 + float(column @ slopes)
-            far = b[row] + d[row] * found[0] + F[row] @ (found[1:] @ F[at] + multiplier * F[row])
-            full = -float(far) / rise if rise > DUAL_SETTINGS.dependent else math.inf
-            falls = slopes[1 + rows.equations :]
-            left = np.full(len(falls), math.inf)
-            np.divide(-found[1 + rows.equations :], falls, out=left, where=falls < -1e-14)
-            first = int(left.argmin()) if len(left) else 0
-            step = min(full, max(float(left.min(initial=math.inf)), 0.0))
-            if step == math.inf:
-                return None
-            found += step * slopes
-            multiplier += step
-            if step == full:
-                inverse = _with_row(inverse, slopes, rise)
-                at, found = np.append(at, row), np.append(found, multiplier)
-                entering = False
-            else:
-                gone = 1 + rows.equations + first
-                if abs(inverse[gone, gone]) < DUAL_SETTINGS.multiplier:
-                    return None
-                inverse = _without_row(inverse, gone)
-                at, found = np.delete(at, gone - 1), np.delete(found, gone)
-
-
-def _first(
-    F: Array, d: Array, b: Array, whole: float, guess: Mask, multipliers: Array, equations: int
-) -> tuple[Indices, Array]:
-    """Return the rows of a guess that do not depend on others, nor pull, and their inverse.
-
-    The equations come first.
-    """
-    at: Indices = np.flatnonzero(guess)
-    weight = -multipliers[at]
-    weight[:equations] = -math.inf
-    at = at[weight.argsort(kind="stable")]
-    S = F[at] @ F[at].T + d[at, None] * d[at]
-    scale = 1.0 / np.sqrt(S.diagonal())
-    S *= scale * scale[:, None]
-    S.flat[:: len(S) + 1] += 1e-14  # beside a diagonal of ones
-    kept = np.linalg.cholesky(S).diagonal() ** 2 > DUAL_SETTINGS.dependent
-    for taken in range(len(at)):
-        at = at[kept]
-        if not (kept[:equations].all() and len(at) > equations and d[at].any()):
-            raise np.linalg.LinAlgError
-        matrix = np.zeros((len(at) + 1, len(at) + 1))
-        matrix[0, 1:] = matrix[1:, 0] = d[at]
-        matrix[1:, 1:] = F[at] @ F[at].T
-        inverse = np.linalg.inv(matrix)
-        signed = (inverse @ np.concatenate(([whole], -b[at])))[1 + equations :]
-        pulls = signed < -DUAL_SETTINGS.multiplier * whole
-        if not pulls.any():
-            return at, np.asarray(inverse)
-        if taken >= DUAL_SETTINGS.starts:
-            pulls = np.arange(len(signed)) == signed.argmin()
-        kept = np.concatenate((np.ones(equations, dtype=bool), ~pulls))
-    raise np.linalg.LinAlgError
-
-
-def _with_row(inverse: Array, slopes: Array, rise: float) -> Array:
-    """Return the inverse with a row more, the last."""
-    count = len(inverse)
-    larger = np.empty((count + 1, count + 1))
-    larger[:count, :count] = inverse + slopes[:, None] * (slopes / rise)
-    larger[count, :count] = larger[:count, count] = slopes / rise
-    larger[count, count] = 1.0 / rise
-    return larger
-
-
-def _without_row(inverse: Array, gone: int) -> Array:
-    """Return the inverse without a row."""
-    kept = np.arange(len(inverse)) != gone
-    column = inverse[kept, gone]
-    smaller = inverse[kept][:, kept]
-    smaller -= column[:, None] * (column / inverse[gone, gone])
-    return np.asarray(smaller)

@@ -43,7 +43,7 @@ from numpy.typing import NDArray
 from hand_models.base import Array
 from hand_models.hand import FINGERS
 from planner.programs.conic import Columns, ConicProgram, Outcome, Reached
-from planner.programs.load_bounds import load_box
+from planner.programs.scaled_rows import load_box
 from planner.programs.stance_data import StanceData
 from planner.programs.stance_program import (
     REFINED_SETTINGS,

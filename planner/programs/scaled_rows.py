@@ -19,16 +19,21 @@ from hand_models.wrench_spaces import Row, WrenchSpace
 __all__ = [
     "JOINT_FORCE",
     "JOINT_TORQUE",
+    "LOAD_BOX",
     "LOAD_UNIT",
     "TWIST_UNIT",
     "WRENCH_UNIT",
     "WRIST_RANGE",
     "ScaledRows",
     "is_effort",
+    "load_box",
 ]
 
 LOAD_UNIT: Final = 100.0
 """Scale of a hand's loads y [N]."""
+
+LOAD_BOX: Final = 1e4
+"""Bound on every load, in `LOAD_UNIT`, where no limit counts: far beyond any strength."""
 
 TWIST_UNIT: Final = pose_units(WRIST_COLUMNS)
 """Scale of a wrist's twist y [m, rad]: a twist that loads a hand by roughly `LOAD_UNIT`."""
@@ -180,3 +185,19 @@ def is_effort(row: Row) -> bool:
     """
     of_joint = row.limit in (JOINT_TORQUE, JOINT_FORCE)
     return row.limit == TENDON_TENSION or (of_joint and row.label.endswith("+"))
+
+
+def load_box(wrench: Array) -> float:
+    """Return the bound on every load, in `LOAD_UNIT`, where no limit counts, for a body wrench.
+
+    `LOAD_BOX`, or a hundred times the force that the body needs if that is more, as for bodies of
+    a tonne and above. With larger loads hands do little but squeeze each other, where hard rows
+    nearly contradict the balance.
+
+    Parameters
+    ----------
+    wrench : ndarray, shape (nb,)
+        Body wrench, then prescribed components of hands' wrenches, in `WRENCH_UNIT`.
+    """
+    force = float(np.linalg.norm(wrench[:3] * WRENCH_UNIT[:3]))
+    return max(LOAD_BOX, 100.0 * force / LOAD_UNIT)

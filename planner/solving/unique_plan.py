@@ -34,7 +34,7 @@ from planner.programs import (
     Rows,
     StanceData,
     TensionTrade,
-    active_rows_near,
+    dual_optimum,
     is_least,
     optimum,
     parted,
@@ -172,7 +172,7 @@ def active_set_optimum(
     near : bool, optional
         True if the start is an exact optimum of another program, of the same hands at another body
         wrench or with other tiles: its multipliers say more than its slacks, and where other rows
-        are active, these are sought by the dual method (`programs.active_rows_near`).
+        are active, these are sought by the dual method (`programs.dual_optimum`).
 
     Returns
     -------
@@ -182,9 +182,11 @@ def active_set_optimum(
     rows, weight = Rows.of(data), share * tie_weight(len(data.hands))
     Q = 2.0 * weight * data.rows.tie
     point = _point(data, start)
-    found = (
-        _near_optimum(rows, Q, point) if near else _on_active_rows(rows, Q, point, _rounds(len(Q)))
-    )
+    if near:
+        # a row that does not count may be violated, and one that counts may have some slack
+        found = dual_optimum(rows, Q, point, _guess(rows, point, 1e-2, 1e-9))
+    else:
+        found = _on_active_rows(rows, Q, point, _rounds(len(Q)))
     if found is None:
         return None
     # with exact multipliers the bound of `unique_bound` is the optimum but for second terms
@@ -276,22 +278,6 @@ def _on_active_rows(
         guess = _guess(rows, start, ratio, -math.inf)
         with suppress(ApartError):
             return optimum(rows, Q, start, guess, rounds, weight, fixed=fixed)
-    return None
-
-
-def _near_optimum(rows: Rows, Q: Array, start: Point) -> Optimum | None:
-    """Return the optimum from that of another program, which is near; None if too far."""
-    # a row that does not count may be violated, and one that counts may have some slack
-    guess = _guess(rows, start, 1e-2, 1e-9)
-    with suppress(ApartError):
-        found = optimum(rows, Q, start, guess, 1)
-        if found is not None:
-            return found
-    active = active_rows_near(rows, Q, guess, start.multipliers)
-    if active is not None:
-        with suppress(ApartError):
-            # by rounding a row more or less
-            return optimum(rows, Q, start, active, 3)
     return None
 
 

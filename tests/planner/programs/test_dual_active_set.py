@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planner.programs import Rows, active_rows_near, optimum, solvers, tie_weight
+from planner.programs import Rows, dual_optimum, solvers, tie_weight
 from planner.programs.program import Best
 from planner.solving.unique_plan import active_set_optimum
 from tests.suite.helpers.stances import ask, on_wall, program_data
@@ -29,24 +29,41 @@ def test_a_guess_that_is_wrong_in_some_rows_leads_to_the_optimum(stance):
         guess[chance.choice(own, wrong, replace=False)] = False
         guess[chance.choice(others, wrong, replace=False)] = True
         multipliers[guess & ~face.active] = chance.uniform(0.0, 0.01, wrong)
-        active = active_rows_near(rows, Q, guess, multipliers)
-        if active is None:
+        again = dual_optimum(rows, Q, point._replace(multipliers=multipliers), guess)
+        if again is None:
             continue
         found += 1
-        again = optimum(rows, Q, point, active, 1)
-        assert again is not None
-        assert again.point.u == pytest.approx(point.u, abs=1e-9)
-        assert again.point.z == pytest.approx(point.z, abs=1e-7)
-        assert again.point.u == pytest.approx(least, abs=1e-5)
+        z, u, multipliers = again.point
+        assert u == pytest.approx(point.u, abs=1e-9)
+        assert z == pytest.approx(point.z, abs=1e-7)
+        assert u == pytest.approx(least, abs=1e-5)
+        # Karush, Kuhn and Tucker's conditions, from the rows themselves
+        room = rows.room(z, u)
+        assert room.min() >= -1e-9
+        assert np.abs(room[again.face.active]).max() <= 1e-9
+        assert multipliers[rows.equations :].min() >= -1e-14
+        assert not multipliers[~again.face.active].any()
+        assert np.abs(Q * z + multipliers @ rows.C).max() <= 1e-13
+        assert multipliers @ rows.d == pytest.approx(1.0, abs=1e-9)
     assert found >= 7
 
 
 def test_the_optimum_itself_needs_no_change(stance):
     rows, Q, (point, face), *_ = stance
-    assert np.array_equal(active_rows_near(rows, Q, face.active, point.multipliers), face.active)
+    again = dual_optimum(rows, Q, point, face.active)
+    assert np.array_equal(again.face.active, face.active)
+
+
+def test_faces_of_both_methods_keep_an_optimum_up_to_the_same_weight(stance):
+    rows, Q, (point, face), *_ = stance
+    again = dual_optimum(rows, Q, point, face.active)
+    weights = np.geomspace(0.1, 1e9, 60)
+    kept = [face.keeps(point, weight) for weight in weights]
+    assert kept == [again.face.keeps(again.point, weight) for weight in weights]
+    assert {True, False} <= {*kept}
 
 
 def test_there_is_no_start_without_a_limit(stance):
     rows, Q, (point, _), *_ = stance
     equations = np.arange(len(rows.b)) < rows.equations
-    assert active_rows_near(rows, Q, equations, point.multipliers) is None
+    assert dual_optimum(rows, Q, point, equations) is None
