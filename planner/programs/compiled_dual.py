@@ -159,7 +159,7 @@ def _loads(F: Array, at: Indices, found: Array) -> Array:
     return x
 
 
-@compiled("f2", "f1", "f1", "i0", "f1", "b1", "f1", "f0", "f0", "f0", "i0", "i0", "f0")
+@compiled("f2", "f1", "f1", "i0", "f1", "b1", "f1", "f0", "f0", "f0", "i0", "i0", "f0", "f0")
 def optimum_near(
     C: Array,
     d: Array,
@@ -174,6 +174,7 @@ def optimum_near(
     starts: int,
     changes: int,
     met_by: float,
+    stationarity: float,
 ) -> tuple[bool, Indices, Array, float, Array, Array]:
     """Return active rows, z, u and λ of an optimum, and the inverse of `DualFace`.
 
@@ -188,8 +189,8 @@ def optimum_near(
         Fields ``dependent`` and ``multiplier`` of `DualSettings`.
     starts, changes : int
         Fields of `DualSettings`.
-    met_by : float
-        Field ``met`` of `DualSettings`.
+    met_by, stationarity : float
+        Fields ``met`` of `DualSettings` and ``stationarity`` of `SolvingTolerances`.
     """
     F, size = C / np.sqrt(Q), np.ones(len(C))
     counts = np.zeros(len(C), dtype=np.bool_)
@@ -281,17 +282,25 @@ def optimum_near(
     at, found, inverse = at[:count], found[: count + 1], inverse[: count + 1, : count + 1].copy()
     left, exact = np.zeros(count + 1), False
     for steps in range(4):
-        x = _loads(F, at, found)
+        missing = _loads(F, at, found) - x
         left[0] = whole - _product(d[at], found[1:])
         most = abs(left[0]) / whole
         for i in range(count):
             left[i + 1] = _product(F[at[i]], x) - b[at[i]] - d[at[i]] * found[0]
             most = max(most, abs(left[i + 1]) * size[at[i]])
-        exact = steps > 0 and most <= met_by
+            left[i + 1] += _product(F[at[i]], missing)
+        still = np.sqrt(_product(Q * missing, missing))
+        exact = steps > 0 and most <= met_by and still <= stationarity
         if exact:
             break
+        change = np.zeros(count + 1)
         for i in range(count + 1):
-            found[i] += _product(inverse[i], left)
+            change[i] = _product(inverse[i], left)
+        found += change
+        x += missing + _loads(F, at, change)
+    for i in range(len(F)):
+        room = (b[i] + d[i] * found[0] - _product(F[i], x)) * size[i]
+        exact = exact and (active[i] or not counts[i] or room >= -row)
     signed = np.zeros(len(C))
     signed[at] = found[1:] / size[at]
     for i in range(count + 1):

@@ -117,7 +117,7 @@ def dual_optimum(rows: Rows, Q: Array, start: Point, guess: Mask) -> Optimum | N
     own = DUAL_SETTINGS
     tolerances, most = (TOLERANCES.row, own.dependent, own.multiplier), (own.starts, own.changes)
     exact, at, z, u, multipliers, inverse = optimum_near(
-        *rows, Q, guess, start.multipliers, *tolerances, *most, own.met
+        *rows, Q, guess, start.multipliers, *tolerances, *most, own.met, TOLERANCES.stationarity
     )
     if not len(at):
         return None
