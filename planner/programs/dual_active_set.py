@@ -46,7 +46,7 @@ class DualSettings:
     """Square of what a row adds to others, at which it depends on them linearly."""
     multiplier: float = 1e-12  # below zero, by rounding
     starts: int = 4  # from which all rows with negative multipliers are dropped at once
-    changes: int = 32
+    changes: int = 96
     """Rows that come or go at most: with more, a program is sooner solved anew."""
     met: float = 1e-10  # of the equations of active rows, scaled, and of dᵀ λ = 1
 
