@@ -30,6 +30,7 @@ from .climbs import (
     Raise as Raise,
     RefusedMoves as RefusedMoves,
     find_climb as find_climb,
+    weakest_state as weakest_state,
 )
 from .deadline import (
     DeadlineError as DeadlineError,
@@ -185,6 +186,7 @@ from .walls import (
     PlaceGrid as PlaceGrid,
     WallProgress as WallProgress,
     WallSource as WallSource,
+    finer_about as finer_about,
     read_wall as read_wall,
     wall_digest as wall_digest,
     wall_of as wall_of,

@@ -17,6 +17,7 @@ from .hold_trials import (
     closed_holds as closed_holds,
     grid_of_trials as grid_of_trials,
     ranked_holds as ranked_holds,
+    trials_at as trials_at,
     try_holds as try_holds,
 )
 from .kept_hands import (

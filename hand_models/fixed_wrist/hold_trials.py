@@ -45,6 +45,7 @@ __all__ = [
     "closed_holds",
     "grid_of_trials",
     "ranked_holds",
+    "trials_at",
     "try_holds",
 ]
 
@@ -181,9 +182,6 @@ def grid_of_trials(
     if angles < 1:
         raise InvalidInputError(f"at least one is needed, got {angles}", field="angles")
     low, high = (end(rock.triangles.vertices, axis=0) for end in (np.min, np.max))
-    above = float(low[2]) - spacing
-    # five rays along each side of the square in which the plane of the rock is found
-    beside = np.stack(np.meshgrid(*[np.linspace(-radius, radius, 5)] * 2), axis=-1)
     each_way = [math.floor((b - a) / spacing) + 1 for a, b in zip(low[:2], high[:2], strict=True)]
     count = math.prod(each_way) * angles * len(rotations)
     if most is not None and count > most:
@@ -198,10 +196,42 @@ def grid_of_trials(
         a + 0.5 * ((b - a) % spacing) + spacing * np.arange(number)
         for a, b, number in zip(low[:2], high[:2], each_way, strict=True)
     ]
+    points = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2)
+    above = float(low[2]) - spacing
+    return trials_at(rock, points, angles, rotations, approach, above, radius, report)
+
+
+def trials_at(
+    rock: Mesh,
+    points: Array,
+    angles: int,
+    rotations: Sequence[float],
+    approach: tuple[float, float, float] | None,
+    above: float,
+    radius: float,
+    report: Progress | None = None,
+) -> list[HoldTrial]:
+    """Return places at which to try a hand, at points across z of a rock's frame.
+
+    Parameters
+    ----------
+    rock, angles, rotations, approach, radius, report
+        As of `grid_of_trials`.
+    points : ndarray, shape (n, 2)
+        Along x and y of the rock's frame [m].
+    above : float
+        Where rays along z begin, before all rock [m].
+
+    Returns
+    -------
+    list of HoldTrial
+        Places at each point on rock, one for every angle with every rotation.
+    """
+    # five rays along each side of the square in which the plane of the rock is found
+    beside = np.stack(np.meshgrid(*[np.linspace(-radius, radius, 5)] * 2), axis=-1)
     found: list[HoldTrial] = []
     into = (0.0, 0.0, 1.0)  # z of a rock's frame
-    points = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2).tolist()
-    for number, (x, y) in enumerate(points):
+    for number, (x, y) in enumerate(points.tolist()):
         if report is not None:
             report(number, len(points))
         depth = rock.entry((x, y, above), into)

@@ -1,5 +1,5 @@
 from .finding import ClimbProgress as ClimbProgress, find_climb as find_climb
-from .found_climb import FoundClimb as FoundClimb
+from .found_climb import FoundClimb as FoundClimb, weakest_state as weakest_state
 from .move_checks import MoveChecks as MoveChecks
 from .other_bodies import detours as detours
 from .outcome import (

@@ -11,9 +11,9 @@ from planner.climbs.outcome import ClimbStatus, DecidingStage, Raise, RefusedMov
 from planner.climbs.routing import ClimbStep
 from planner.question import Question
 from planner.route import Climb, Route, RouteResult
-from planner.search import Found, State, Wall
+from planner.search import Ends, Found, State, Wall, search
 
-__all__ = ["FoundClimb", "deciding_stage", "with_joints"]
+__all__ = ["FoundClimb", "deciding_stage", "weakest_state", "with_joints"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -128,3 +128,29 @@ def deciding_stage(
         placements={limb: p for limb, p in placed if p >= 0},
         body=state.body,
     ), state
+
+
+def weakest_state(
+    found: FoundClimb, start: Ends, goal: Ends, seconds: float | None = None
+) -> State | None:
+    """Return the state that decides a climb; without a climb, where its bound chokes.
+
+    That is the weakest state of the best way that hands hold, however little they do. None if there
+    is no such way.
+
+    Parameters
+    ----------
+    found : FoundClimb
+    start, goal : Ends
+        Those of the climb.
+    seconds : float, optional
+        Longest time of the search for the best way [s].
+    """
+    if found.deciding is not None:
+        placed = found.deciding.placements
+        members = tuple([placed.get(limb, -1) for limb in found.wall.robot.limbs])
+        return State(found.deciding.body, members)
+    held = found.found
+    if not held.states:
+        held = search(found.wall, start, goal, within=0.5, seconds=seconds)
+    return held.states[int(held.factors.argmin())] if held.states else None

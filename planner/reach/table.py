@@ -79,6 +79,24 @@ class ReachTable:
         ]
         return cls.of(counts, spanned, angles)
 
+    def beside(self, other: ReachTable) -> ReachTable:
+        """Return the table of the bodies of both, of the same placements and limbs.
+
+        Parameters
+        ----------
+        other : ReachTable
+            Of the bodies that come after those of this one.
+        """
+        pairs = [(self.counts, self), (other.counts, other)]
+        counts = np.concatenate([each for each, _ in pairs], axis=1)
+        angles = list[Array]()
+        for limb in range(counts.shape[2]):
+            # by placement, first those of this table's bodies
+            owners = [np.repeat(np.arange(len(c)), c[:, :, limb].sum(axis=1)) for c, _ in pairs]
+            every = np.concatenate([table._of_limb(limb) for _, table in pairs])
+            angles.append(every[np.argsort(np.concatenate(owners), kind="stable")])
+        return self.of(counts, np.concatenate([self.spanned, other.spanned], axis=1), angles)
+
     @property
     def counts(self) -> Indices:
         """Number of solutions of each placement, body and limb, shape (P, B, L)."""

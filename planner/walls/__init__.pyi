@@ -21,3 +21,4 @@ from .places import (
     palms_apart as palms_apart,
     place_trials as place_trials,
 )
+from .refining import finer_about as finer_about

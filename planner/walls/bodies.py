@@ -21,7 +21,7 @@ from planner.motion import distances_from_rock
 from planner.robots import Robot
 from planner.walls.grids import BodyGrid
 
-__all__ = ["BodyPoses", "body_poses", "equal_poses"]
+__all__ = ["BodyPoses", "body_poses", "clear_of", "equal_poses"]
 
 
 class BodyPoses(NamedTuple):
@@ -46,6 +46,11 @@ class BodyPoses(NamedTuple):
     shifts: Indices
     in_rock: int
     given: tuple[int, ...] = ()
+
+    @property
+    def on_grid(self) -> int:
+        """Number of poses of the grid, which come first."""
+        return int((self.cells >= 0).all(axis=1).sum())
 
     def with_more(self, more: Sequence[Pose], near: float, turn: float) -> BodyPoses:
         """Return the poses with further ones, which may be shifted to those near them.
@@ -120,7 +125,7 @@ def body_poses(grid: BodyGrid, rock: Mesh, rock_pose: Pose, robot: Robot) -> Bod
                 place = centre + axes @ np.append(at, height + stand_off)
                 poses += [Pose(place, turn) for turn in turns]
                 cells += [(i, j, k, m) for m in range(len(turns))]
-    free = _clear_of(rock, robot, poses, grid.clear)
+    free = clear_of(rock, robot, poses, grid.clear)
     if not free.any():
         raise InvalidInputError(
             "no pose of the body is clear of the rock; give larger ones", field="stand_offs"
@@ -162,7 +167,7 @@ def _mean_plane(away: Array) -> tuple[Array, Array]:
     return axes, away @ axes
 
 
-def _clear_of(rock: Mesh, robot: Robot, poses: Sequence[Pose], clear: float) -> NDArray[np.bool_]:
+def clear_of(rock: Mesh, robot: Robot, poses: Sequence[Pose], clear: float) -> NDArray[np.bool_]:
     """Return at which poses in the rock's frame the body keeps so far from it [m]."""
     segments, radii = robot.body_capsules
     points, reaches = list[Array](), list[Array]()

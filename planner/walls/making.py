@@ -66,11 +66,14 @@ class Chunk(msgspec.Struct, omit_defaults=True):
         Rows of (3, 4) arrays: axes and origins in W of hand frames to reach [1, m].
     bodies : str
         Digest of the poses of the body from which they are to be reached.
+    given : bool
+        Whether these are the poses of the body that were given, not those of the grid.
     """
 
     points: list[list[HoldTrial]] = []
     poses: list[list[float]] = []
     bodies: str = ""
+    given: bool = False
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -94,6 +97,8 @@ class WallSource:
     more_places : sequence of HandOnHold
         Further placements, such as those of a given stance. Those that the grid has, too, count
         once; the others are put at the end.
+    more_points : sequence of (float, float)
+        Further points at which hands are tried, along x and y of the rock's frame [m].
     more_bodies : sequence of Pose
         Further poses of B in W; likewise. The body may be shifted from them to those of the grid
         that are nearer than one and a half of its spacings, and turned by `BodyGrid.turn` at most.
@@ -110,6 +115,7 @@ class WallSource:
     bodies: BodyGrid = field(default_factory=BodyGrid)
     gravity: Array = field(default_factory=lambda: np.array(EARTH_GRAVITY))
     more_places: Sequence[HandOnHold] = ()
+    more_points: Sequence[tuple[float, float]] = ()
     more_bodies: Sequence[Pose] = ()
     together: int = 12
 
@@ -137,15 +143,15 @@ class WallSource:
         near = 1.5 * self.bodies.spacing
         return found.with_more(self.more_bodies, near, self.bodies.turn)
 
-    def answer(self, question: bytes, bodies: Sequence[Pose]) -> bytes:
+    def answer(self, question: bytes, bodies: BodyPoses) -> bytes:
         """Answer a chunk's question.
 
         Parameters
         ----------
         question : bytes
             As `wall_of` asks it.
-        bodies : sequence of Pose
-            Poses of the body, of `poses`.
+        bodies : BodyPoses
+            Of `poses`.
         """
         chunk = msgspec.msgpack.decode(question, type=Chunk)
         if chunk.points:
@@ -155,7 +161,9 @@ class WallSource:
             return _written(_place_arrays(*found))
         poses = [Pose(row[:, 3], row[:, :3]) for row in np.reshape(chunk.poses, (-1, 3, 4))]
         rock = Rock("the rock", self.rock, self.rock_pose, frozenset(self.robot.limbs))
-        return _written(vars(reach_table(self.robot, poses, bodies, rock=rock)))
+        grid, given = _parts(bodies)
+        own = given if chunk.given else grid
+        return _written(vars(reach_table(self.robot, poses, own, rock=rock)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -218,9 +226,9 @@ def wall_of(
         If the deadline passes first.
     """
     started = time.perf_counter()
-    asked = ask or (lambda every: (source.answer(each, bodies.poses) for each in every))
+    asked = ask or (lambda every: (source.answer(each, bodies) for each in every))
     with errors_under("places"):
-        points = place_trials(source.places, source.rock, source.robot.hand)
+        points = place_trials(source.places, source.rock, source.robot.hand, source.more_points)
     cut = range(0, len(points), source.together)
     chunks = [points[i : i + source.together] for i in cut]
     questions = [msgspec.msgpack.encode(Chunk(points=chunk)) for chunk in chunks]
@@ -255,19 +263,7 @@ def wall_of(
             field="places.spacing",
         )
     placed = time.perf_counter()
-    rows = _rows([hand.pose for hand in hands])
-    before = sha256(repr(_rows(bodies.poses)).encode()).hexdigest()
-    cut = range(0, len(rows), source.together)
-    grouped = [rows[i : i + source.together] for i in cut]
-    questions = [msgspec.msgpack.encode(Chunk(poses=group, bodies=before)) for group in grouped]
-    tables, lost_places = list[ReachTable](), 0
-    for group, answer in zip(grouped, _asked("reach", questions, asked, report), strict=True):
-        if answer is None:
-            lost_places += len(group)
-            tables.append(_unknown(len(group), len(bodies.poses), source.robot))
-        else:
-            tables.append(ReachTable(**answer))
-    reach = ReachTable.joined(tables)
+    reach, lost_places = _reach(source, [hand.pose for hand in hands], bodies, asked, report)
     reached = time.perf_counter()
     apart, gravity = source.places.apart, source.gravity
     wall = assemble_wall(source.robot, hands, parts, bodies, reach, apart=apart, gravity=gravity)
@@ -285,6 +281,49 @@ def wall_of(
             "tables": time.perf_counter() - reached,
         },
     )
+
+
+def _reach(
+    source: WallSource,
+    poses: Sequence[Pose],
+    bodies: BodyPoses,
+    ask: Ask,
+    report: WallProgress | None,
+) -> tuple[ReachTable, int]:
+    """Return what limbs reach, and the number of placements that are not known to be reached.
+
+    The bodies of the grid are asked about apart from those that are given: what is known of them
+    stays so whatever these are.
+    """
+    rows, lost = _rows(poses), set[int]()
+    cut = [slice(i, i + source.together) for i in range(0, len(rows), source.together)]
+    parts = [each for each in _parts(bodies) if each]
+    digests = [sha256(repr(_rows(part)).encode()).hexdigest() for part in parts]
+    chunks = [
+        Chunk(poses=rows[group], bodies=digest, given=i > 0)
+        for i, digest in enumerate(digests)
+        for group in cut
+    ]
+    questions = [msgspec.msgpack.encode(chunk) for chunk in chunks]
+    tables = list[ReachTable]()
+    for i, answer in enumerate(_asked("reach", questions, ask, report)):
+        if answer is None:
+            part, group = parts[i // len(cut)], range(len(rows))[cut[i % len(cut)]]
+            lost |= {*group}
+            tables.append(_unknown(len(group), len(part), source.robot))
+        else:
+            tables.append(ReachTable(**answer))
+    whole, *others = [
+        ReachTable.joined(tables[i * len(cut) : (i + 1) * len(cut)]) for i in range(len(parts))
+    ]
+    for other in others:
+        whole = whole.beside(other)
+    return whole, len(lost)
+
+
+def _parts(bodies: BodyPoses) -> tuple[Sequence[Pose], Sequence[Pose]]:
+    """Return the poses of the grid, and those that are given."""
+    return bodies.poses[: bodies.on_grid], bodies.poses[bodies.on_grid :]
 
 
 def _asked(

@@ -18,7 +18,13 @@ from hand_models.base import (
     RefusedPlaceError,
     UnsupportedError,
 )
-from hand_models.fixed_wrist import HoldTrial, closed_holds, grid_of_trials, wrench_spaces
+from hand_models.fixed_wrist import (
+    HoldTrial,
+    closed_holds,
+    grid_of_trials,
+    trials_at,
+    wrench_spaces,
+)
 from hand_models.hand import Grasp, SpinyHand
 from hand_models.rock import Mesh
 from hand_models.tile import Surface
@@ -30,8 +36,18 @@ from planner.walls.grids import PlaceGrid
 __all__ = ["HandPlace", "best_places", "hand_at", "palms_apart", "place_trials"]
 
 
-def place_trials(grid: PlaceGrid, rock: Mesh, hand: SpinyHand) -> list[list[HoldTrial]]:
-    """Return the hands that are tried at each point of a grid on a rock.
+def place_trials(
+    grid: PlaceGrid, rock: Mesh, hand: SpinyHand, more: Sequence[tuple[float, float]] = ()
+) -> list[list[HoldTrial]]:
+    """Return the hands that are tried at each point of a grid on a rock, then at further points.
+
+    Parameters
+    ----------
+    grid : PlaceGrid
+    rock : Mesh
+    hand : SpinyHand
+    more : sequence of (float, float)
+        Further points along x and y of the rock's frame [m].
 
     Raises
     ------
@@ -46,6 +62,10 @@ def place_trials(grid: PlaceGrid, rock: Mesh, hand: SpinyHand) -> list[list[Hold
             "smaller than the spacing?",
             field="spacing",
         )
+    if more:
+        above = float(rock.triangles.vertices[:, 2].min()) - grid.spacing
+        points = np.array(more), grid.angles, grid.rotations, None
+        every += trials_at(rock, *points, above, radius)
     return [list(there) for _, there in groupby(every, lambda trial: trial.point)]
 
 

@@ -6,7 +6,8 @@ import io
 import math
 import re
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -83,7 +84,7 @@ def seek_climb(
     DeadlineError
         If the deadline passes before there is a wall to search.
     """
-    from planner import Ends, WallSource, find_climb, wall_of
+    from planner import WallSource, finer_about, weakest_state
 
     build = builder_of(request.robot, robots)
     with errors_under("hand"):
@@ -115,9 +116,46 @@ def seek_climb(
         more_places=places,
         more_bodies=[body for body, _ in stances.values()],
     )
-    progress, bodies = _Progress(request.id, report), source.poses()
+    progress = _Progress(request.id, report)
+    search = partial(_search, request, stances, progress, make)
+    sought = search(source, request.refine)
+    for times in range(1, request.refine + 1):
+        if sought.found.status == "found" or deadline.expired():
+            break
+        part = None if request.time is None else request.time / (request.refine + 1)
+        state = weakest_state(sought.found, sought.start, sought.goal, part)
+        if state is None:
+            break
+        source = finer_about(source, sought.made.wall, state, times)
+        again, best = search(source, request.refine - times), sought.found.least
+        # without a climb, that there is none among more placements says more
+        if best is None or (again.found.least or 0.0) > best:
+            sought = again
+    return sought
+
+
+def _search(
+    request: requests.ClimbRequest,
+    stances: Mapping[str, tuple[Pose, Mapping[str, object]]],
+    progress: _Progress,
+    make: Callable[[WallSource, WallProgress], MadeWall] | None,
+    source: WallSource,
+    later: int,
+) -> SoughtClimb:
+    """Make the wall of a source, and search it for the climb of a request.
+
+    Parameters
+    ----------
+    stances : mapping of str to tuple
+        Ends of the climb that are stances: body, and hands by path in the request.
+    later : int
+        Number of searches that may come after this one, in the time that is left.
+    """
+    from planner import Ends, find_climb, wall_of
+
+    bodies, ends = source.poses(), {"start": request.start, "goal": request.goal}
     origins = np.array([body.position for body in bodies.poses])
-    its_body = dict(zip(stances, bodies.given, strict=True))
+    its_body = dict(zip(stances, bodies.given, strict=False))
     at = {
         name: np.arange(len(origins)) == its_body[name]
         if name in its_body
@@ -130,14 +168,14 @@ def seek_climb(
         else:
             made = make(source, progress.wall)
     except InvalidInputError as error:
-        raise _named(error, list(given)) from None
-    limbs = len(robot.limbs)
+        raise _named(error, [path for _, hands in stances.values() for path in hands]) from None
+    limbs = len(source.robot.limbs)
     members = {name: made.given[k * limbs : (k + 1) * limbs] for k, name in enumerate(stances)}
     start, goal = (Ends(bodies=at[name], members=members.get(name)) for name in ends)
     left = deadline.left()
     # the rest of the time is for the changes that would raise the load factor, and for the reply
-    most = math.inf if left is None else 0.95 * left
-    seconds = min(most, request.time or math.inf)
+    most = math.inf if left is None else 0.95 * left / (later + 1)
+    seconds = min(most, (request.time or math.inf) / (request.refine + 1))
     found = find_climb(
         made.wall,
         start,
@@ -150,7 +188,7 @@ def seek_climb(
         seconds=None if math.isinf(seconds) else seconds,
         progress=progress.search,
     )
-    return SoughtClimb(found, made, mesh, pose, start, goal)
+    return SoughtClimb(found, made, source.rock, source.rock_pose, start, goal)
 
 
 def climb_reply(

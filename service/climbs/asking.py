@@ -27,6 +27,7 @@ class Sought(NamedTuple):
     best_within: str
     at_least: float | None
     time: float | None
+    refine: int
     surface: str
     spacing: float | None
     body_spacing: float | None
@@ -67,6 +68,7 @@ class Sought(NamedTuple):
             best_within=_part(self.best_within, "--best-within"),
             at_least=self.at_least,
             time=self.time,
+            refine=self.refine,
             start=climb_end(self.start, "--from", self.radius, read),
             goal=climb_end(self.goal, "--to", self.radius, read),
         )

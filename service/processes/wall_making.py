@@ -82,7 +82,7 @@ def _answering(source: WallSource, bodies: BodyPoses) -> Callable[[bytes], Answe
 
     def answer(question: bytes) -> Answer:
         start = time.perf_counter()
-        found = source.answer(question, bodies.poses)
+        found = source.answer(question, bodies)
         return Answer(found, "application/octet-stream", seconds=time.perf_counter() - start)
 
     return answer

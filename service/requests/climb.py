@@ -100,6 +100,9 @@ class ClimbRequest(Query, frozen=True, kw_only=True):
       when it is proven that there is none.
     - ``time``: time of the search, after which the best climb so far is the answer [s]; by default
       until the deadline.
+    - ``refine``: how often places and poses are added about the weakest stage, and the climb is
+      searched for again, until it is as good as was asked for. Each search has an equal part of the
+      time; the best climb is the answer, and its bound is about its own placements and poses.
     - ``want``: names of further results: ``trajectory``, the knots of the climb; ``certificate``,
       the file that proves the bound.
     - ``parts``: over zenoh, replies of their own say how far the search is, and knots come move by
@@ -132,6 +135,9 @@ class ClimbRequest(Query, frozen=True, kw_only=True):
     ] = 0.05
     at_least: Enough | None = None
     time: SearchTime | None = None
+    refine: Annotated[
+        int, Meta(ge=0, le=16, description="times that the weakest stage gets places and poses")
+    ] = 0
     want: Annotated[
         list[Literal["trajectory", "certificate"]],
         Meta(

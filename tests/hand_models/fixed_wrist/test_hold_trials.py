@@ -19,6 +19,7 @@ from hand_models.fixed_wrist import (
     grid_of_trials,
     ranked_holds,
     scattered_places,
+    trials_at,
     try_holds,
     wrench_space,
 )
@@ -43,6 +44,14 @@ DIRECTIONS = {
 @pytest.fixture(scope="module")
 def wall():
     return Mesh(*fractal_wall(3), anywhere=True)
+
+
+def test_hands_at_points_are_those_of_a_grid_that_has_the_points(wall):
+    grid = grid_of_trials(wall, 0.2, 3, (0.0, 1.0), radius=RADIUS)
+    points = np.array([trial.point[:2] for trial in grid[::6]])[[4, 1]]
+    above = float(wall.triangles.vertices[:, 2].min()) - 0.2
+    there = trials_at(wall, points, 3, (0.0, 1.0), None, above, RADIUS)
+    assert there == [*grid[24:30], *grid[6:12]]
 
 
 def test_a_grid_covers_the_rock_and_hands_come_against_its_normal(wall):

@@ -44,6 +44,13 @@ def some_table(clear):
     return placements, bodies, reach_table(robosimian(), placements, bodies, clear=clear)
 
 
+def test_tables_of_some_bodies_and_of_the_others_are_the_table_of_all():
+    placements, bodies, table = some_table(True)
+    first, rest = (reach_table(robosimian(), placements, of) for of in (bodies[:2], bodies[2:]))
+    for name, value in vars(first.beside(rest)).items():
+        np.testing.assert_array_equal(getattr(table, name), value)
+
+
 def test_every_solution_reaches_its_placement_within_limits():
     robot, (placements, bodies, table) = robosimian(), some_table(True)
     scene = CollisionScene(robot, ())

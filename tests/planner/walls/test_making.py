@@ -206,7 +206,7 @@ def test_lost_chunks_are_counted_and_the_rest_is_made():
     def ask(questions):
         calls.append(questions)
         for i, question in enumerate(questions):
-            yield None if i == 1 else source.answer(question, bodies.poses)
+            yield None if i == 1 else source.answer(question, bodies)
 
     made = wall_of(source, bodies, ask)
     # 6 points of a chunk, two hands at each
@@ -229,7 +229,7 @@ def test_a_deadline_ends_it():
     def ask(questions):
         for question in questions:
             asked.append(question)
-            yield source.answer(question, bodies.poses)
+            yield source.answer(question, bodies)
 
     with pytest.raises(deadline.DeadlineError), deadline.within(1e-9):
         wall_of(source, bodies, ask)

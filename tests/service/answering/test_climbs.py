@@ -11,10 +11,11 @@ import pytest
 from msgspec.structs import replace as changed
 
 from hand_models.base import InvalidInputError, Pose
-from planner import MadeWall, evaluate, find_climb
+from planner import BodyGrid, MadeWall, PlaceGrid, climb_certificate, evaluate, find_climb
+from planner.certification import check_bound
 from planner.prepare import settle_each
 from service import requests
-from service.answering import SoughtClimb, climb_reply, route_of, seek_climb
+from service.answering import SoughtClimb, climb_reply, climbs, route_of, seek_climb
 from service.answering.climbs import _bodies_near, _Progress
 from service.replies import KnotReply, PartReply
 from service.requests import ClimbEnd, ClimbRequest
@@ -96,6 +97,53 @@ def test_knots_come_move_by_move_where_parts_are_asked_for() -> None:
     assert knots == climb_reply(REQUEST, sought()).trajectory
     moves = [{knot.move for knot in part.knots} for part in parts]
     assert moves == [{k} for k in range(len(moves))]
+
+
+def test_the_best_of_all_refined_searches_is_the_answer(monkeypatch) -> None:
+    first, asked = sought(), []
+    least = first.found.least
+    assert least is not None
+    # the second is worse, the third better, and after it a fourth as good
+    factors = iter([least, 0.5 * least, 2.0 * least, 2.0 * least])
+
+    def search(*given: object) -> SoughtClimb:
+        asked.append(given[-2:])
+        found = replace(first.found, status="not_proven", least=next(factors))
+        return first._replace(found=found)
+
+    monkeypatch.setattr(climbs, "_search", search)
+    found = seek_climb(changed(REQUEST, refine=3))
+    assert found.found.least == 2.0 * least
+    assert [later for _, later in asked] == [3, 2, 1, 0]
+    points = [len(source.more_points) for source, _ in asked]
+    assert points[0] == 0 < points[1] < points[2] < points[3]
+
+
+def test_a_climb_that_is_good_enough_is_not_refined(monkeypatch) -> None:
+    first = sought()
+    good = first._replace(found=replace(first.found, status="found"))
+    monkeypatch.setattr(climbs, "_search", lambda *_: good)
+    monkeypatch.setattr("planner.finer_about", None)
+    assert seek_climb(changed(REQUEST, refine=3)) is good
+
+
+@pytest.mark.slow
+def test_where_a_coarse_grid_proves_that_there_is_no_climb_more_places_are_tried() -> None:
+    coarse = changed(
+        REQUEST,
+        start=ClimbEnd(height=0.8),
+        goal=ClimbEnd(height=1.0),
+        places=PlaceGrid(spacing=0.3),
+        bodies=BodyGrid(spacing=0.3, stand_offs=(0.6,)),
+        time=120.0,
+    )
+    found, finer = seek_climb(coarse), seek_climb(changed(coarse, refine=1))
+    assert found.found.status == finer.found.status == "none"
+    assert len(finer.made.wall.places) > len(found.made.wall.places)
+    assert len(finer.made.wall.bodies) > len(found.made.wall.bodies)
+    # the proof is about all of them
+    proof = climb_certificate(finer.made.wall, finer.start, finer.goal, finer.found.found)
+    assert check_bound(proof).proven
 
 
 def test_an_end_is_the_bodies_that_it_names() -> None:
