@@ -240,7 +240,7 @@ class ActiveFace:
         )
 
 
-class Face(Protocol):
+class OptimalFace(Protocol):
     """The points at which a set of rows is active.
 
     Attributes
@@ -273,14 +273,14 @@ class Optimum(NamedTuple):
     """An optimum, and the face of active rows of which it is the least point."""
 
     point: Point
-    face: Face
+    face: OptimalFace
 
 
 def optimum(
     rows: Rows,
     Q: Array,
     start: Point,
-    first: Mask | Face,
+    first: Mask | OptimalFace,
     rounds: int,
     weight: float = 1.0,
     *,
@@ -296,7 +296,7 @@ def optimum(
         Diagonal of the curvature at a weight of 1.
     start : Point
         A point that is nearly feasible, or any point if ``first`` are the optimum's active rows.
-    first : ndarray of bool, shape (k,), or Face
+    first : ndarray of bool, shape (k,), or OptimalFace
         The rows that are active at first.
     rounds : int
         Largest number of sets of active rows that are tried.

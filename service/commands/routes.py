@@ -104,7 +104,7 @@ def _above(name: str, text: str, most: float = 1e3, **more: Any) -> Any:
 
 
 END_FORMS: Final = "x,y,z in W, height:Z, or a stance"
-REFINED: Final = "That the weakest stage gets more places and poses, and all is searched again."
+REFINE_HELP: Final = "That the weakest stage gets more places and poses, and all is searched again."
 
 sought_options = options.asked_for(
     climbs.Sought,
@@ -121,7 +121,7 @@ sought_options = options.asked_for(
     ),
     _above("--at-least", "Load factor that is enough in all stages."),
     _above("--time", "Of the search, after which the best climb so far is taken [s].", most=1e6),
-    click.option("--refine", type=click.IntRange(0, 16), default=0, metavar="TIMES", help=REFINED),
+    click.option("--refine", type=click.IntRange(0, 16), default=0, help=REFINE_HELP),
     click.option("--surface", default="rock", show_default=True, help="A preset's name."),
     _above("--spacing", "Of the points at which hands are tried [m].", most=10.0),
     _above("--body-spacing", "Of the places of the body [m].", most=10.0),

@@ -61,7 +61,7 @@ def test_bodies_are_halfway_to_where_the_body_may_be_shifted_and_clear_of_rock(f
 
 @pytest.mark.slow
 def test_points_and_bodies_move_with_the_wall(finer):
-    source, wall, state, more = finer
+    source, _, state, more = finer
     moved = Pose(np.array([1.0, -2.0, 0.5]), turns_about([0.3, -0.7, 0.4]))
     there_source = tiny_source(
         rock_pose=moved @ source.rock_pose, gravity=moved.rotation @ source.gravity
