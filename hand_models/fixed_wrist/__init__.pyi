@@ -15,9 +15,7 @@ from .hold_trials import (
     HoldRank as HoldRank,
     HoldTrial as HoldTrial,
     closed_holds as closed_holds,
-    grid_of_trials as grid_of_trials,
     ranked_holds as ranked_holds,
-    trials_at as trials_at,
     try_holds as try_holds,
 )
 from .kept_hands import (
@@ -62,3 +60,4 @@ from .seat_search import PULL_OFF as PULL_OFF, best_seats as best_seats
 from .slipped_tiles import SLIPPED_TILE as SLIPPED_TILE, slipped_hand as slipped_hand
 from .space import wrench_space as wrench_space, wrench_spaces as wrench_spaces
 from .tension_box import TensionLimit as TensionLimit, tension_limits as tension_limits
+from .trial_grids import grid_of_trials as grid_of_trials, trials_at as trials_at

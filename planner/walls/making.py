@@ -5,7 +5,6 @@ A chunk's answer depends on its question and the wall's source alone, whatever p
 
 from __future__ import annotations
 
-import io
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -37,6 +36,7 @@ from planner.reach import ReachTable, reach_table
 from planner.robots import Robot
 from planner.screening import HandParts
 from planner.search import Wall
+from planner.walls.answers import place_arrays, places_of, read, written
 from planner.walls.assembly import assemble_wall
 from planner.walls.bodies import BodyPoses, body_poses, equal_poses
 from planner.walls.files import robot_digest
@@ -158,12 +158,12 @@ class WallSource:
             up = -self.rock_pose.rotation.T @ self.gravity
             hand, kept = self.robot.hand, self.places.kept
             found = best_places(hand, self.rock, self.surface, chunk.points, up, kept)
-            return _written(_place_arrays(*found))
+            return written(place_arrays(*found))
         poses = [Pose(row[:, 3], row[:, :3]) for row in np.reshape(chunk.poses, (-1, 3, 4))]
         rock = Rock("the rock", self.rock, self.rock_pose, frozenset(self.robot.limbs))
         grid, given = _parts(bodies)
         own = given if chunk.given else grid
-        return _written(vars(reach_table(self.robot, poses, own, rock=rock)))
+        return written(vars(reach_table(self.robot, poses, own, rock=rock)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -237,7 +237,7 @@ def wall_of(
         if answer is None:
             lost_trials += sum(map(len, chunk))
             continue
-        places, others = _places_of(answer)
+        places, others = places_of(answer)
         found += places
         refused += others
     limb, rock = source.robot.limbs[0], (source.rock, source.rock_pose, source.surface)
@@ -335,7 +335,7 @@ def _asked(
         deadline.check("the wall was made")
         if report is not None:
             report(phase, i + 1, len(questions))
-        yield None if answer is None else _read(answer)
+        yield None if answer is None else read(answer)
 
 
 def _rows(poses: Sequence[Pose]) -> list[list[float]]:
@@ -376,44 +376,3 @@ def _unknown(places: int, bodies: int, robot: Robot) -> ReachTable:
     shape = places, bodies, len(robot.limbs)
     none = [np.zeros((0, len(robot.chains[limb].joints))) for limb in robot.limbs]
     return ReachTable.of(np.zeros(shape, dtype=np.intp), np.ones(shape, dtype=bool), none)
-
-
-def _written(arrays: dict[str, Any]) -> bytes:
-    """Return arrays by name as the bytes of a file."""
-    out = io.BytesIO()
-    np.savez(out, allow_pickle=False, **arrays)
-    return out.getvalue()
-
-
-def _read(answer: bytes) -> dict[str, Any]:
-    with np.load(io.BytesIO(answer), allow_pickle=False) as file:
-        return {name: file[name] for name in file.files}
-
-
-def _place_arrays(places: Sequence[HandPlace], refused: Counter[str]) -> dict[str, Any]:
-    """Return placements and reasons of refusals as arrays by name."""
-    arrays: dict[str, Any] = {
-        "count": np.array(len(places)),
-        "reasons": np.array(list(refused), dtype=str),
-        "refused": np.array(list(refused.values()), dtype=np.intp),
-    }
-    for i, place in enumerate(places):
-        pose = place.rock_in_hand
-        arrays[f"{i}/pose"] = np.column_stack([pose.rotation, pose.position])
-        arrays[f"{i}/numbers"] = np.array([place.outer_rotation, place.lift])
-        for name, value in place.parts._asdict().items():
-            arrays[f"{i}/{name}"] = np.asarray(value)
-    return arrays
-
-
-def _places_of(arrays: dict[str, Any]) -> tuple[list[HandPlace], Counter[str]]:
-    counts = zip(arrays["reasons"].tolist(), arrays["refused"].tolist(), strict=True)
-    places = list[HandPlace]()
-    for i in range(int(arrays["count"])):
-        own = {name: arrays[f"{i}/{name}"] for name in HandParts._fields}
-        own["lengths"] = tuple(own["lengths"].tolist())
-        pose = arrays[f"{i}/pose"]
-        at = Pose(np.ascontiguousarray(pose[:, 3]), np.ascontiguousarray(pose[:, :3]))
-        rotation, lift = arrays[f"{i}/numbers"].tolist()
-        places.append(HandPlace(at, rotation, lift, HandParts(**own)))
-    return places, Counter(dict(counts))
