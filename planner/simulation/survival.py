@@ -44,6 +44,9 @@ class DrawSettings:
     replanned_piece: int = 5
     """Largest number of draws between two looks at the deadline, and that a process takes at a
     time: at fixed tensions, and with new set-points."""
+    hopeless: float = 10.0
+    """Utilisation of new set-points over the strongest part's strength, beyond which all is lost
+    [1]: they have the least utilisation, and what slips next hardly ever lowers it."""
 
 
 DRAW_SETTINGS: Final = DrawSettings()
@@ -315,7 +318,9 @@ class _Replanned:
             own = strengths[draws]
             over = cascade.used / own
             unit = over.argmax(axis=1)
-            slip = over[np.arange(len(own)), unit] > 1.0
+            hopeless = cascade.used.max() > DRAW_SETTINGS.hopeless * own.max(axis=1)
+            held[np.array(draws)[hopeless]] = False
+            slip = (over[np.arange(len(own)), unit] > 1.0) & ~hopeless
             after = np.repeat(gone[None], len(own), axis=0)
             after[np.arange(len(own)), unit] |= slip
             if self._late:

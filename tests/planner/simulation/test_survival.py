@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 from functools import cache
 
 import msgspec
@@ -13,7 +14,7 @@ from hand_models.tile import TileStrengths
 from planner import Plan, Question, SurvivalSettings, SurvivalShare, find_survival, plan
 from planner.prepare import prepare_stance
 from planner.result import Survival
-from planner.simulation import Cascade, draw_slips, plan_loads
+from planner.simulation import Cascade, draw_slips, plan_loads, survival as simulated
 from service.answering import question
 from service.commands.stances import read_request
 from service.requests import PlanRequest
@@ -91,6 +92,15 @@ def test_new_set_points_save_what_fixed_tensions_lose():
     late = survival("wall-300", draws=20, replanned=20, strength=1.5, delay=10.0, **PLAIN)
     assert late.replanned is not None
     assert late.replanned.probability == late.holds.probability == found.holds.probability
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["wall-300", "slab", "boulders"])
+def test_what_is_given_up_is_lost_in_the_end(name, monkeypatch):
+    given_up = survival(name, draws=40, replanned=40, seed=7)
+    to_the_end = replace(simulated.DRAW_SETTINGS, hopeless=math.inf)
+    monkeypatch.setattr(simulated, "DRAW_SETTINGS", to_the_end)
+    assert survival(name, draws=40, replanned=40, seed=7).replanned == given_up.replanned
 
 
 def test_a_cascade_is_a_way_from_slip_to_slip():
