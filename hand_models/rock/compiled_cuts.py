@@ -1,4 +1,4 @@
-"""Cut triangles with a plane, and join the polylines of the cut across small gaps (compiled).
+"""Cut triangles with a plane, join the cut across small gaps, and trim it (compiled).
 
 Several polylines are an array of their points, one after another, and the index at which each ends.
 """
@@ -11,7 +11,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices, compiled
 
-__all__ = ["bridged", "plane_cut"]
+__all__ = ["bridged", "plane_cut", "reached"]
 
 
 @compiled()
@@ -215,3 +215,75 @@ def bridged(points: Array, stops: Indices, gap: float) -> tuple[Array, Indices]:
             total += 1
         start, ends[piece] = end, total
     return joined[:total], ends
+
+
+@compiled()
+def _parts_within(a: Array, b: Array, reach: float) -> tuple[float, float]:
+    """Return from where to where, in parts of it, a segment is within the square; last if none."""
+    first, last = 0.0, 1.0
+    for k in range(2):
+        step = b[k] - a[k]
+        if max(abs(a[k]), abs(b[k])) <= reach:
+            continue
+        if step != 0.0:
+            low, high = (-reach - a[k]) / step, (reach - a[k]) / step
+            first, last = max(first, min(low, high)), min(last, max(low, high))
+        elif abs(a[k]) > reach:
+            first, last = math.inf, -math.inf
+    return first, last
+
+
+@compiled("f2", "i1", "f0")
+def reached(points: Array, stops: Indices, reach: float) -> tuple[Array, Indices, float]:
+    """Return the parts of polylines within a square, and the sum of their lengths [m].
+
+    Polylines, given and returned, are points (s, t), shape (p, 2) [m], and the index at which each
+    ends; the square is |s|, |t| ≤ ``reach`` [m].
+    """
+    found, ends = np.empty((3 * len(points), 2)), np.empty(len(points) + len(stops), dtype=np.intp)
+    total = runs = start = 0
+    for stop in stops:
+        piece = points[start:stop]
+        start = stop
+        outside = -1
+        for i in range(len(piece)):
+            if outside < 0 and max(abs(piece[i, 0]), abs(piece[i, 1])) > reach:
+                outside = i
+        if outside < 0:
+            found[total : total + len(piece)] = piece
+            total += len(piece)
+            ends[runs] = total
+            runs += 1
+            continue
+        # begin a ring where nothing is cut apart that belongs together
+        ring = piece[0, 0] == piece[-1, 0] and piece[0, 1] == piece[-1, 1]
+        turn, around = (outside, len(piece) - 1) if ring else (0, len(piece))
+        through = 0.0
+        inside = False
+        for i in range(len(piece) - 1):
+            a, b = piece[(i + turn) % around], piece[(i + turn + 1) % around]
+            first, last = _parts_within(a, b, reach)
+            if inside and (first > 0.0 or through < 1.0):
+                inside = False
+                ends[runs] = total
+                runs += 1
+            through = last
+            if first >= last:
+                continue
+            if not inside:
+                found[total] = a + first * (b - a)
+                total += 1
+            inside = True
+            for k in range(2):
+                found[total, k] = a[k] + last * (b[k] - a[k]) if last < 1.0 else b[k]
+            total += 1
+        if inside:
+            ends[runs] = total
+            runs += 1
+    length = 0.0
+    start = 0
+    for end in ends[:runs]:
+        for i in range(start, end - 1):
+            length += math.hypot(found[i + 1, 0] - found[i, 0], found[i + 1, 1] - found[i, 1])
+        start = end
+    return found[:total], ends[:runs], length

@@ -12,79 +12,14 @@ import numpy as np
 
 from hand_models.base import Array, Indices, compiled
 
-__all__ = ["least_heights", "raised_outlines", "reached", "seen_corners", "seen_outlines"]
-
-
-@compiled()
-def _parts_within(a: Array, b: Array, reach: float) -> tuple[float, float]:
-    """Return from where to where, in parts of it, a segment is within the square; last if none."""
-    first, last = 0.0, 1.0
-    for k in range(2):
-        step = b[k] - a[k]
-        if max(abs(a[k]), abs(b[k])) <= reach:
-            continue
-        if step != 0.0:
-            low, high = (-reach - a[k]) / step, (reach - a[k]) / step
-            first, last = max(first, min(low, high)), min(last, max(low, high))
-        elif abs(a[k]) > reach:
-            first, last = math.inf, -math.inf
-    return first, last
-
-
-@compiled("f2", "i1", "f0")
-def reached(points: Array, stops: Indices, reach: float) -> tuple[Array, Indices, float]:
-    """Return the parts of polylines within a square, and the sum of their lengths [m].
-
-    Polylines, given and returned, are points (s, t), shape (p, 2) [m], and the index at which each
-    ends; the square is |s|, |t| ≤ ``reach`` [m].
-    """
-    found, ends = np.empty((3 * len(points), 2)), np.empty(len(points) + len(stops), dtype=np.intp)
-    total = runs = start = 0
-    for stop in stops:
-        piece = points[start:stop]
-        start = stop
-        outside = -1
-        for i in range(len(piece)):
-            if outside < 0 and max(abs(piece[i, 0]), abs(piece[i, 1])) > reach:
-                outside = i
-        if outside < 0:
-            found[total : total + len(piece)] = piece
-            total += len(piece)
-            ends[runs] = total
-            runs += 1
-            continue
-        # begin a ring where nothing is cut apart that belongs together
-        ring = piece[0, 0] == piece[-1, 0] and piece[0, 1] == piece[-1, 1]
-        turn, around = (outside, len(piece) - 1) if ring else (0, len(piece))
-        through = 0.0
-        inside = False
-        for i in range(len(piece) - 1):
-            a, b = piece[(i + turn) % around], piece[(i + turn + 1) % around]
-            first, last = _parts_within(a, b, reach)
-            if inside and (first > 0.0 or through < 1.0):
-                inside = False
-                ends[runs] = total
-                runs += 1
-            through = last
-            if first >= last:
-                continue
-            if not inside:
-                found[total] = a + first * (b - a)
-                total += 1
-            inside = True
-            for k in range(2):
-                found[total, k] = a[k] + last * (b[k] - a[k]) if last < 1.0 else b[k]
-            total += 1
-        if inside:
-            ends[runs] = total
-            runs += 1
-    length = 0.0
-    start = 0
-    for end in ends[:runs]:
-        for i in range(start, end - 1):
-            length += math.hypot(found[i + 1, 0] - found[i, 0], found[i + 1, 1] - found[i, 1])
-        start = end
-    return found[:total], ends[:runs], length
+__all__ = [
+    "least_heights",
+    "opened_overhangs",
+    "raised_outlines",
+    "seen_corners",
+    "seen_outlines",
+    "widened_outline",
+]
 
 
 @compiled()
@@ -184,6 +119,53 @@ def seen_outlines(points: Array, stops: Indices, reach: float) -> tuple[Array, I
             total += 1
         start, ends[piece] = stops[piece], total
     return found[:total], ends, hidden
+
+
+@compiled()
+def _mirrored(points: Array) -> Array:
+    """Return an outline with s turned round, rock on its left again."""
+    found = np.empty_like(points)
+    for i in range(len(points)):
+        found[-1 - i, 0], found[-1 - i, 1] = -points[i, 0], points[i, 1]
+    return found
+
+
+@compiled()
+def _opened(points: Array, depth: float) -> Array:
+    """Return an outline with what lips toward +s hide closed, from so far behind each lip on."""
+    found = np.empty((2 * len(points), 2))
+    found[0], total = points[0], 1
+    under, back, lip = False, False, points[0, 0]
+    for i in range(1, len(points)):
+        (s, t), (at, into) = points[i - 1], points[i]
+        if not under and at >= s:
+            back = False
+        elif not under and not back:
+            under = into > t
+            if i > 1:
+                # a lip is where the outline turns back to the left, into the rock
+                turn = (s - points[i - 2, 0]) * (into - t) - (t - points[i - 2, 1]) * (at - s)
+                under = turn > 0.0
+            back, lip = not under, s
+        bound = lip - depth if under else -math.inf
+        if (s < bound) != (at < bound):
+            found[total, 0], found[total, 1] = bound, t + (bound - s) / (at - s) * (into - t)
+            total += 1
+        if at >= bound:
+            found[total] = points[i]
+            total += 1
+        under = under and at <= lip
+    return found[:total]
+
+
+@compiled("f2", "f0")
+def opened_overhangs(points: Array, depth: float) -> Array:
+    """Return an outline (s, t), (n, 2), with overhangs that are open so far behind their lips [m].
+
+    An upright piece closes what is farther behind a lip, along s. With a depth of zero only that
+    is left which `seen_outlines` sees, with an infinite one everything.
+    """
+    return _mirrored(_opened(_mirrored(_opened(points, depth)), depth))
 
 
 @compiled("f2", "i1", "f1")
@@ -330,3 +312,49 @@ def raised_outlines(
         stops[runs] = count
         runs += 1
     return found[:count], stops[:runs]
+
+
+@compiled("f2", "f1", "f1", "f1", "f0", "f0")
+def widened_outline(
+    points: Array, s: Array, own: Array, least: Array, share: float, slack: float
+) -> Array:
+    """Return an outline with overhangs, raised by a share of what stands out beside its plane.
+
+    What an overhang hides is moved along t as the rock before it is: in the same order along every
+    line, so that it crosses nothing. Places s are in equal steps.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        Outline in the plane, rock on its left [m].
+    s, own, least, slack
+        As of `raised_outlines`; without ``own`` or ``least`` nothing is moved.
+    share : float
+        Share of the whole way by which each point is raised.
+    """
+    size, step = 1, s[1] - s[0]
+    for i in range(1, len(points)):
+        size += int(abs(points[i, 0] - points[i - 1, 0]) / step) + 3
+    found, total = np.empty((size, 2)), 0
+    for i in range(len(points)):
+        a, b = points[max(i - 1, 0)], points[i]
+        low, high = (min(a[0], b[0]) - s[0]) / step, (max(a[0], b[0]) - s[0]) / step
+        first, last = max(math.floor(low) + 1, 0), min(math.ceil(high) - 1, len(s) - 1)
+        # at the places that the segment passes, then at its end
+        for k in range(max(last - first + 1, 0) + 1):
+            place = first + k if a[0] <= b[0] else last - k
+            here, t = b
+            if first <= place <= last:
+                here, t = s[place], a[1] + (s[place] - a[0]) / (b[0] - a[0]) * (b[1] - a[1])
+                raised = t - (own[place] - least[place])
+            else:
+                cell = min(max(math.floor((here - s[0]) / step), 0), len(s) - 2)
+                sides, part = slice(cell, cell + 2), (here - s[cell]) / step
+                raised = _raised_between(t, part, own[sides], least[sides], step)
+            if math.isfinite(raised) and 0.0 <= (here - s[0]) / step <= len(s) - 1:
+                t += share * (raised - t)
+            if total and math.hypot(here - found[total - 1, 0], t - found[total - 1, 1]) <= slack:
+                continue
+            found[total, 0], found[total, 1] = here, t
+            total += 1
+    return found[:total]

@@ -166,7 +166,7 @@ def _weights(part: int) -> Array:
 
 def _reached(pieces: Sequence[Array], scale: Scale) -> list[Array]:
     """Return the parts of polylines within the square |s|, |t| ≤ reach."""
-    from hand_models.rock.compiled_outlines import reached
+    from hand_models.rock.compiled_cuts import reached
 
     if not pieces:
         return []
@@ -220,7 +220,7 @@ class Heights(NamedTuple):
 
 
 def _strips(
-    scale: Scale, strips: Array, heights: Heights, section: PolylineSection | None
+    scale: Scale, strips: Array, heights: Heights, section: PolylineSection | None, share: float
 ) -> RockStrips:
     """Return how far the rock of each strip under a finger's tiles lies behind their envelope."""
     from hand_models.rock.compiled_heights import depths_behind, line_depths
@@ -234,7 +234,14 @@ def _strips(
     points, _ = strung(section.pieces)
     places = points.view(complex)[:, 0]
     behind = depths_behind(points, scale.places, depths)
+    if share < 1.0:
+        behind = share * np.minimum(behind, scale.reach)
     return RockStrips(strips, places, np.full_like(places, 1j), behind)
+
+
+def _width_share(hidden: float, scale: Scale) -> float:
+    """Return the share of rock beside a plane that counts: 1 where overhangs hide a bridged gap."""
+    return min(max(2.0 - hidden / scale.bridged_gap, 0.0), 1.0)
 
 
 class OutlinedHold(Hold):
@@ -263,8 +270,9 @@ class OutlinedHold(Hold):
         """Return the envelope of the rock across a finger's width, in the finger's plane, smoothed.
 
         The envelope is the least t of the rock across the tiles, and across the phalanges' frames.
-        Where the finger may reach under an overhang in its plane by more than a bridged gap, only
-        the cut in this plane is used. Arguments are those of `Hold.finger_rock`.
+        Where the finger may reach under an overhang in its plane by more than a bridged gap, the
+        rock beside the plane counts less, and overhangs are open deeper; from twice that on, only
+        the cut in the plane is used. Arguments are those of `Hold.finger_rock`.
 
         Returns
         -------
@@ -276,38 +284,46 @@ class OutlinedHold(Hold):
         InvalidInputError
             If an outline is too long to be a surface of rock; the field is ``hold``.
         """
-        from hand_models.rock.compiled_outlines import (
-            least_heights,
-            raised_outlines,
-            seen_corners,
-            seen_outlines,
-        )
+        from hand_models.rock import compiled_outlines as compiled
+        from hand_models.rock.compiled_smoothing import without_repeats
 
         scale, slack = self._scale, BASE_TOLERANCES.length
         middle = _reached(self._pieces(origin, s_axis, t_axis), scale)
-        outlines = [_from_least(piece) for piece in middle]
+        # of repeated points none would be a lip
+        outlines = [_from_least(without_repeats(piece)) for piece in middle]
         points, stops, hidden = _no_outlines()
         if outlines:
-            points, stops, hidden = seen_outlines(*strung(outlines), size.reach)
-        plane = np.array([origin, s_axis, t_axis], dtype=float)
-        heights = self._heights(plane, size) if hidden <= scale.bridged_gap else None
+            points, stops, hidden = compiled.seen_outlines(*strung(outlines), size.reach)
+        plane, share = np.array([origin, s_axis, t_axis], dtype=float), _width_share(hidden, scale)
+        # what is beside several outlines with overhangs belongs to none of them
+        several = hidden > scale.bridged_gap and len(outlines) > 1
+        heights = self._heights(plane, size) if share > 0.0 and not several else None
         if heights is None:
             return FingerRock(self._smooth(middle))
-        s, corners = scale.places, seen_corners(points, stops, slack)
-        own = least_heights(points, stops, s)
-
-        def envelope(least: Array, ends: Array) -> PolylineSection | None:
-            runs = raised_outlines(corners, s, own, least, ends, scale.bridged_gap, slack)
-            return self._smooth(unstrung(*runs))
-
+        s, gap = scale.places, scale.bridged_gap
+        own = compiled.least_heights(points, stops, s)
         heights = heights._replace(
             tile=np.minimum(heights.tile, own), frame=np.minimum(heights.frame, own)
         )
+        # and where the plane has no rock, that beside it has nothing to be moved to
+        alone = np.hypot(s, heights.frame)[np.isinf(own)] < size.reach
+        if share < 1.0 and alone.any():
+            return FingerRock(self._smooth(middle))
+
+        def envelope(least: Array, ends: Array) -> PolylineSection | None:
+            if share < 1.0:
+                opened = compiled.opened_overhangs(outlines[0], gap * (1.0 / share - 1.0))
+                line = compiled.widened_outline(opened, s, own, least, share, slack)
+                return self._smooth([line])
+            corners = compiled.seen_corners(points, stops, slack)
+            runs = compiled.raised_outlines(corners, s, own, least, ends, gap, slack)
+            return self._smooth(unstrung(*runs))
+
         tile = envelope(heights.tile, heights.tile_ends)
         if tiles_only:
             return FingerRock(tile)
         frame = envelope(heights.frame, heights.frame_ends)
-        return FingerRock(tile, frame, _strips(scale, size.strips, heights, tile))
+        return FingerRock(tile, frame, _strips(scale, size.strips, heights, tile, share))
 
     def _smooth(self, runs: Sequence[Array]) -> PolylineSection | None:
         curves = [smooth(run, self._scale) for run in runs]

@@ -9,7 +9,7 @@ from hypothesis import given, strategies as st
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import savgol_filter
 
-from hand_models.rock import compiled_outlines, compiled_smoothing
+from hand_models.rock import compiled_cuts, compiled_smoothing
 from hand_models.rock.smoothing import Scale, smooth
 from hand_models.sections import PolylineSection
 
@@ -124,7 +124,7 @@ def test_what_is_within_reach_of_a_line_is_cut_where_it_leaves(seed):
     line = np.cumsum(rng.normal(0.0, 0.1, (40, 2)), axis=0)
     if rng.random() < 0.5:
         line = np.vstack([line, line[:1]])
-    points, ends, length = compiled_outlines.reached(line, np.array([len(line)]), 0.2)
+    points, ends, length = compiled_cuts.reached(line, np.array([len(line)]), 0.2)
     assert np.abs(points).max(initial=0.0) <= 0.2 + 1e-12
     inner = np.delete(np.arange(len(points) - 1), ends[:-1] - 1) if len(points) else []
     steps = [math.dist(points[i], points[i + 1]) for i in inner]
