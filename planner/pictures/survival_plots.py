@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -27,6 +27,10 @@ DRAWN_SHARES = (
     ("replanned", COLOUR_OF["green"], "all hands hold, new set-points after each slip"),
 )
 """Shares that are drawn, with their colours."""
+
+
+MOST_SLIPS: Final = 24
+"""Largest number of rows of a drawn cascade, for which there is room at eight points."""
 
 
 def plot_survival(
@@ -63,26 +67,37 @@ def plot_survival(
 
 
 def _draw_cascade(axes: Axes, found: Survival) -> None:
-    """Draw which tile slips at each step, and the largest load over strength that is left."""
-    names = [" ".join(p for p in (s.limb, s.finger, s.phalanx) if p) for s in found.cascade]
-    places = np.arange(len(names))
-    loads = [s.load for s in found.cascade]
+    """Draw which tile slips at each step, and the largest load over strength that is left.
+
+    Of a long cascade the first slips and the last ones, with a row between them.
+    """
+    drawn, more = list(enumerate(found.cascade)), len(found.cascade) + 1 - MOST_SLIPS
+    if more > 1:
+        first = MOST_SLIPS // 2
+        last = [(i - more + 1, slip) for i, slip in drawn[first + more :]]
+        drawn = [*drawn[:first], *last]
+    names = {i: " ".join(p for p in (s.limb, s.finger, s.phalanx) if p) for i, s in drawn}
+    places = np.array(list(names))
+    loads = [s.load for _, s in drawn]
     style: dict[str, Any] = {"height": 0.55, "color": COLOUR_OF["red"], "alpha": 0.75}
     axes.barh(places, loads, label="the weakest, which slips", **style)
-    left = [(i, s.most) for i, s in enumerate(found.cascade) if s.most is not None]
+    left = [(i, s.most) for i, s in drawn if s.most is not None]
     if left:
         at, most = zip(*left, strict=True)
         axes.plot(most, np.array(at) + 0.4, "D", color="black", markersize=5,
                   label="the weakest of those left, afterwards")  # fmt: skip
     axes.axvline(1.0, color="0.4", linewidth=1.0, linestyle="--")
-    axes.set_yticks(places, names, fontsize=8)
-    axes.set_ylim(max(len(names), 1) - 0.3, -0.7)
+    if more > 1:
+        names[MOST_SLIPS // 2] = f"… {more} more …"
+    rows = sorted(names)
+    axes.set_yticks(rows, [names[row] for row in rows], fontsize=8)
+    axes.set_ylim(max(len(rows), 1) - 0.3, -0.7)
     end = "then all hands hold" if found.cascade_holds else "then the stance is lost"
     axes.set(
         title="one cascade at fixed tensions, read downward",
-        xlabel=f"load over strength; {end if names else 'nothing slips'}",
+        xlabel=f"load over strength; {end if rows else 'nothing slips'}",
     )
-    if names:
+    if rows:
         _legend_below(axes)
 
 
@@ -94,7 +109,8 @@ def _legend_below(axes: Axes) -> None:
 def _draw_curves(axes: Axes, over_load: Sequence[tuple[float, Survival]]) -> None:
     """Draw the probabilities over the load, with their intervals."""
     loads = [load for load, _ in over_load]
-    axes.plot(loads, [s.no_slip for _, s in over_load], color="black", label="no tile slips")
+    formula = [s.no_slip for _, s in over_load]
+    axes.plot(loads, formula, color="black", label="no tile or palm slips")
     for name, colour, label in DRAWN_SHARES:
         known = [(load, getattr(s, name)) for load, s in over_load]
         shares = [(load, share) for load, share in known if isinstance(share, SurvivalShare)]
@@ -131,7 +147,7 @@ def _draw_agreement(axes: Axes, over_load: Sequence[tuple[float, Survival]]) -> 
     wide = [none - [1.0 - s.high for _, s in known], [1.0 - s.low for _, s in known] - none]
     axes.plot([0.0, 1.0], [0.0, 1.0], color="0.6", linewidth=0.8)
     axes.errorbar(formula, none, yerr=np.maximum(wide, 0.0), fmt="o", markersize=4, capsize=2.5)
-    axes.set(title="no tile slips", xlabel="by the formula", ylabel="simulated")
+    axes.set(title="no tile or palm slips", xlabel="by the formula", ylabel="simulated")
     axes.set_aspect("equal")
     axes.grid(alpha=0.3)
 
@@ -150,7 +166,7 @@ def plot_route_survival(found: RouteSurvival, path: Path) -> None:
     axes = figure.subplots()
     known = [(i, s.survival) for i, s in enumerate(found.stages) if s.survival is not None]
     axes.plot([i for i, _ in known], [s.no_slip for _, s in known], "o", color="black",
-              markersize=4, label=_of_climb("no tile slips", found.no_slip))  # fmt: skip
+              markersize=4, label=_of_climb("no tile or palm slips", found.no_slip))  # fmt: skip
     for shift, (name, colour, label) in zip((-0.12, 0.12), DRAWN_SHARES, strict=True):
         pairs = [(i, getattr(s, name)) for i, s in known]
         shares = [(i, share) for i, share in pairs if isinstance(share, SurvivalShare)]
