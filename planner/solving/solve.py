@@ -149,12 +149,12 @@ def answer_on(
         If the deadline passes before a plan passes the checks or is proven infeasible.
     """
     modelled, budget = time.perf_counter(), Budget(SETTINGS.programs)
-    deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
+    done = "limits were known" if known else "hands were closed on their holds"
+    deadline.check(f"the {done}, which took {modelled - start:.2g} s")
     checks = prepare_checks(prepared) if known is None else known
     answer: Answer | None = _next_verified(prepared, checks, budget, near)
     if answer is None:
-        found = _solutions(prepared, budget, near, twice=prove)
-        answer = _first_verified(prepared, checks, found)
+        answer = _first_verified(prepared, checks, _solutions(prepared, budget, near, twice=prove))
     answer = _second_look(prepared, checks, answer, budget, prove=prove)
     if isinstance(answer, Failed):
         deadline.check("a plan was found or proven infeasible")

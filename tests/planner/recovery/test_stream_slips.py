@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hand_models.base import InvalidInputError, UnsupportedError
+from planner import deadline
 from planner.question import LostTile
 from planner.recovery import Recovery
 from planner.streaming import WrenchStream
@@ -80,3 +81,9 @@ def test_what_cannot_slip_is_refused(stream: WrenchStream):
     with WrenchStream(compliant) as other, pytest.raises(UnsupportedError) as refused:
         other.set_points(other.first, [TILE])
     assert refused.value.field == "lost"
+
+
+def test_a_deadline_does_not_say_that_hands_were_closed(stream: WrenchStream):
+    words = r"before the limits were known, which took [0-9.e-]+ s"
+    with deadline.within(1e-9), pytest.raises(deadline.DeadlineError, match=words):
+        stream.set_points(stream.first, [TILE])
