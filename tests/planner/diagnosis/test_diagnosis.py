@@ -93,7 +93,11 @@ def first_to_slip(diagnosis: SlipDiagnosis, rng: np.random.Generator) -> int:
     return int(np.argmax(uses / strengths))
 
 
-@pytest.mark.parametrize("name", ["wall-300", "overhang", "slab", "boulders"])
+SIDEWAYS = [pytest.param(name, marks=pytest.mark.slow) for name in ("wall", "wall-300-joints")]
+"""Stances of which many tiles are loaded sideways most: their tendons hardly notice a slip."""
+
+
+@pytest.mark.parametrize("name", ["wall-300", "overhang", "slab", "boulders", *SIDEWAYS])
 @pytest.mark.parametrize("held", [True, False], ids=["held", "kept"])
 @pytest.mark.parametrize("slips", [150, pytest.param(1000, marks=pytest.mark.slow)])
 def test_slips_are_named(name, held, slips):
@@ -120,9 +124,12 @@ def test_slips_are_named(name, held, slips):
         first += found.tiles[0].tile == slipped.tile
         sizes.append(len(found.suspects))
     assert named >= 0.9 * slips
-    assert first >= 0.45 * slips
     # of the slab's ball, tiles of few spines slip first, whose loads hardly show
-    assert np.median(sizes) <= (4 if name != "slab" else 24)
+    least, most = {"slab": (0.45, 24), "wall": (0.45, 24), "wall-300-joints": (0.3, 40)}.get(
+        name, (0.65, 4)
+    )
+    assert first >= least * slips
+    assert np.median(sizes) <= most
 
 
 def test_without_noise_the_tile_or_its_double_comes_first():
