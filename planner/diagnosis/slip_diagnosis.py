@@ -55,7 +55,7 @@ class SlipFindings(NamedTuple):
     suspects : tuple of LostTile
         The first of them, which have 95 % of the probability together.
     reason : str or None
-        Why no slip is seen, one sentence; None if one is.
+        Why no slip is seen, or what the slip of one tile does not explain, one sentence; else None.
     """
 
     seen: bool
@@ -167,7 +167,8 @@ class SlipDiagnosis:
         )
         seen = bool(gain[:, known].max() > 0.5 * numbers["seen"] ** 2)
         suspects = tuple(each.tile for each in tiles[:count])
-        reason = None if seen else self._unseen(own, shown, known, kind)
+        explain = self._left if seen else self._unseen
+        reason = explain(own, shown, known[order], kind)
         return SlipFindings(seen, tiles, suspects, reason)
 
     def _unseen(self, own: Array, shown: _Shown, known: Indices, kind: str) -> str:
@@ -189,6 +190,24 @@ class SlipDiagnosis:
         return (
             f"{said}, and a slip is seen from {least:g} of them; those of {hidden} of {len(known)} "
             "tiles would show less"
+        )
+
+    def _left(self, own: Array, shown: _Shown, known: Indices, kind: str) -> str | None:
+        """Say which data the first of the ``known`` tiles leaves unexplained; None if none."""
+        first = self.signatures[known[0]]
+        here = [(e.hand, e.finger) == (first.hand, first.finger) for e in self.signatures]
+        of_first = np.abs((own - shown.meant[:, known[:1]]) / shown.errors[:, known[:1]]).min(
+            axis=0
+        )
+        off = np.where(here, of_first, np.abs((own - shown.rests) / shown.rest_errors))
+        k = int(known[off[known].argmax()])
+        if off[k] <= _numbers()["unexplained"]:
+            return None
+        tile, what = self.signatures[k].tile, "turn" if kind == "turns" else "tension"
+        return (
+            f"the {what} of {tile.limb} {tile.finger} is {off[k]:.2g} of its standard deviation "
+            "from what the slip of one tile explains: several may have slipped; check data, their "
+            "units and set-points, too"
         )
 
     def ambiguous(self, *, held: bool) -> tuple[tuple[LostTile, LostTile], ...]:
@@ -244,6 +263,6 @@ def _numbers() -> dict[str, float]:
     table = bundled_table("diagnosis.toml", "planner.parameters")
     sections = (
         ("noise", ("tension", "least_tension", "winch_angle")),
-        ("suspects", ("credible", "least_use", "seen", "sticks")),
+        ("suspects", ("credible", "least_use", "seen", "sticks", "unexplained")),
     )
     return {name: table.positive(section, name) for section, names in sections for name in names}

@@ -33,7 +33,7 @@ class DiagnosisReply(StanceReply, kw_only=True):
     - ``suspects``: the first of them, which have 95 % of the probability together: as ``lost`` of
       set-points.
     - ``ambiguous``: pairs of tiles of one finger whose slips look alike.
-    - ``reason``: why no slip is seen; null if one is.
+    - ``reason``: why no slip is seen, or what the slip of one tile does not explain; else null.
     """
 
     seen: bool
