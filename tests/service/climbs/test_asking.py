@@ -24,6 +24,7 @@ TEXTS = {
     "best_within": "7%",
     "at_least": None,
     "time": 60.0,
+    "refine": 2,
     "surface": "rock",
     "spacing": 0.2,
     "body_spacing": None,
@@ -47,6 +48,7 @@ def test_a_request_has_what_the_options_say():
     assert request.goal.height == 1.5
     assert request.best_within == pytest.approx(0.07)
     assert (request.rock, request.time, request.places.spacing) == ("small-wall:3", 60.0, 0.2)
+    assert request.refine == 2
     assert request.bodies.stand_offs == (0.6,)
     assert sought(stand_off=()).bodies.stand_offs != (0.6,)
 
