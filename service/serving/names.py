@@ -48,6 +48,8 @@ class ClientIdentity:
     def __init__(self, session: zenoh.Session, robot: str) -> None:
         self._asked = itertools.count()
         self._querier = session.declare_querier(service_key(robot, ServiceName.PLAN))
+        # read once: a querier cannot be read while another thread withdraws it
+        self._id = self._querier.id
         here = service_key(robot, f"{ServiceName.CLIENTS}/{session.info.zid()}")
         self._token = session.liveliness().declare_token(here)
         self.secret = secrets.token_bytes(16)
@@ -61,7 +63,7 @@ class ClientIdentity:
 
     def source(self) -> zenoh.SourceInfo:
         """Return the identifier of the session, with the number of the next query."""
-        return zenoh.SourceInfo(self._querier.id, next(self._asked))
+        return zenoh.SourceInfo(self._id, next(self._asked))
 
     def withdraw(self) -> None:
         """Withdraw the declarations."""

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 import json
+import threading
 from collections.abc import Iterator
 
 import pytest
 import zenoh
 
 from service.serving import CruxClient, open_session, zenoh_config
-from service.serving.names import ClientNames
+from service.serving.names import ClientIdentity, ClientNames
 from service.serving.settings import SERVING_SETTINGS
 from service.wire import ServiceName, service_key
 from tests.service.serving.test_dispatcher import LONG, PLAN, Site, all_up, kind, result, until
@@ -176,3 +177,22 @@ def test_callers_by_ros_2_have_places_of_their_own_but_not_without_end() -> None
     assert known.connected() == {*own}
     # by another identifier nothing is taken from them
     assert known.place(own[0], b"") == ""
+
+
+def test_a_thread_that_still_asks_while_the_client_withdraws_has_a_source():
+    with open_session(zenoh_config(multicast=False)) as session:
+        identity, numbers, wrong = ClientIdentity(session, "robosimian"), [], []
+
+        def ask() -> None:
+            try:
+                for _ in range(20_000):
+                    numbers.append(identity.source().source_sn)
+            except Exception as error:
+                wrong.append(error)
+
+        asking = threading.Thread(target=ask)
+        asking.start()
+        identity.withdraw()
+        asking.join()
+    assert not wrong
+    assert numbers == list(range(20_000))
