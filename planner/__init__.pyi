@@ -85,6 +85,9 @@ from .processes import (
     send_part as send_part,
     starting_children as starting_children,
 )
+from .programs import (
+    load_dual_method as load_dual_method,
+)
 from .question import (
     EARTH_GRAVITY as EARTH_GRAVITY,
     BodyRange as BodyRange,

@@ -14,7 +14,10 @@ from .conic import (
     Outcome as Outcome,
     Reached as Reached,
 )
-from .dual_active_set import dual_optimum as dual_optimum
+from .dual_active_set import (
+    dual_optimum as dual_optimum,
+    load_dual_method as load_dual_method,
+)
 from .dual_bounds import (
     convex_bound as convex_bound,
     hazard_bound as hazard_bound,

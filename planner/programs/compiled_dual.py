@@ -1,6 +1,7 @@
 """The dual active-set method for the quadratic programs of a stance (compiled).
 
-`planner.programs.dual_active_set` has its equations, and the names that are used here.
+`planner.programs.dual_active_set` has its equations, and the names that are used here. Loops over
+numbers compile in a fraction of the time of operations on arrays, and run no slower.
 """
 
 from __future__ import annotations
@@ -55,25 +56,40 @@ def _independent(S: Array, d: Array, dependent: float) -> NDArray[np.bool_]:
 
 
 @compiled()
+def _swap(A: Array, i: int, k: int, across: bool) -> None:
+    """Swap two rows of a matrix, or two columns."""
+    for j in range(len(A)):
+        if across:
+            A[j, i], A[j, k] = A[j, k], A[j, i]
+        else:
+            A[i, j], A[k, j] = A[k, j], A[i, j]
+
+
+@compiled()
 def _inverted(A: Array) -> bool:
     """Invert a matrix in its place by Gauss and Jordan's elimination; return whether it can be."""
-    swapped = np.zeros(len(A), dtype=np.intp)
-    for c in range(len(A)):
-        swapped[c] = c + np.abs(A[c:, c]).argmax()
-        A[c], A[swapped[c]] = A[swapped[c]].copy(), A[c].copy()
+    size = len(A)
+    swapped = np.zeros(size, dtype=np.intp)
+    for c in range(size):
+        swapped[c] = c
+        for i in range(c + 1, size):
+            if abs(A[i, c]) > abs(A[swapped[c], c]):
+                swapped[c] = i
+        _swap(A, c, swapped[c], False)
         pivot = A[c, c]
         if pivot == 0.0:
             return False
         A[c, c] = 1.0
-        A[c] /= pivot
-        for i in range(len(A)):
+        for j in range(size):
+            A[c, j] /= pivot
+        for i in range(size):
             factor = A[i, c]
             if i != c and factor != 0.0:
                 A[i, c] = 0.0
-                for j in range(len(A)):
+                for j in range(size):
                     A[i, j] -= factor * A[c, j]
-    for c in range(len(A) - 1, -1, -1):
-        A[:, c], A[:, swapped[c]] = A[:, swapped[c]].copy(), A[:, c].copy()
+    for c in range(size - 1, -1, -1):
+        _swap(A, c, swapped[c], True)
     return True
 
 
@@ -88,39 +104,61 @@ def _first(
     dependent: float,
     below: float,
     starts: int,
-) -> tuple[Indices, Array, Array]:
-    """Return the rows of a guess that neither depend on others nor pull, u and λ, and the inverse.
+) -> tuple[int, Array, Array]:
+    """Keep the rows of a guess that neither depend on others nor pull; return u and λ, the inverse.
 
-    No rows if these are too few. Rows come in the order of ``at``, the equations first.
+    The rows are left at the beginning of ``at``, in its order, the equations first; the number of
+    them is the first result, zero if they are too few.
     """
-    S, d_all, b_all = _gram(F[at]), d[at], b[at]
-    left = np.flatnonzero(_independent(S, d_all, dependent))
-    taken = 0
+    rows = np.empty((len(at), F.shape[1]))
+    own = np.empty(len(at))
+    for i in range(len(at)):
+        own[i] = d[at[i]]
+        for m in range(F.shape[1]):
+            rows[i, m] = F[at[i], m]
+    S = _gram(rows)
+    kept = _independent(S, own, dependent)
+    # places in S of the rows that are left
+    left = np.empty(len(at), dtype=np.intp)
+    count, taken = len(at), 0
+    for i in range(count):
+        left[i] = i
     while True:
-        count = len(left)
-        own, b_own = d_all[left], b_all[left]
-        if count <= equations or (left[:equations] >= equations).any() or not own.any():
-            return at[:0], own, S
+        fewer, enough, limits = 0, True, False
+        for i in range(count):
+            if kept[i]:
+                left[fewer] = left[i]
+                limits = limits or own[left[i]] > 0.0
+                fewer += 1
+            elif left[i] < equations:
+                enough = False
+        count = fewer
+        if count <= equations or not (enough and limits):
+            return 0, own, S
         inverse = np.zeros((count + 1, count + 1))
         for i in range(count):
-            inverse[i + 1, 0] = inverse[0, i + 1] = own[i]
+            inverse[i + 1, 0] = inverse[0, i + 1] = own[left[i]]
             for j in range(count):
                 inverse[i + 1, j + 1] = S[left[i], left[j]]
         if not _inverted(inverse):
-            return at[:0], own, S
-        found = whole * inverse[0]
+            return 0, own, S
+        found = np.empty(count + 1)
         for i in range(count + 1):
-            found[i] -= _product(inverse[i, 1:], b_own)
-        kept, worst = np.ones(count, dtype=np.bool_), equations
-        for i in range(equations, count):
-            kept[i] = found[i + 1] >= -below * whole
-            worst = i if found[i + 1] < found[worst + 1] else worst
-        if kept.all():
-            return at[left], found, inverse
+            found[i] = whole * inverse[0, i]
+            for j in range(count):
+                found[i] -= inverse[i, j + 1] * b[at[left[j]]]
+        pulling, worst = False, equations
+        for i in range(count):
+            kept[i] = i < equations or found[i + 1] >= -below * whole
+            pulling = pulling or not kept[i]
+            worst = i if i > worst and found[i + 1] < found[worst + 1] else worst
+        if not pulling:
+            for i in range(count):
+                at[i] = at[left[i]]
+            return count, found, inverse
         if taken >= starts:
-            kept[:] = True
-            kept[worst] = False
-        left = left[kept]
+            for i in range(count):
+                kept[i] = i != worst
         taken += 1
 
 
@@ -143,17 +181,16 @@ def _without_row(inverse: Array, count: int, gone: int) -> None:
             for j in range(count):
                 if j != gone:
                     inverse[i, j] -= factor * inverse[gone, j]
-    for i in range(gone, count - 1):
-        inverse[i, :count] = inverse[i + 1, :count]
-    for j in range(gone, count - 1):
-        inverse[: count - 1, j] = inverse[: count - 1, j + 1]
+    for i in range(count - 1):
+        for j in range(count - 1):
+            inverse[i, j] = inverse[i + (i >= gone), j + (j >= gone)]
 
 
 @compiled()
-def _loads(F: Array, at: Indices, found: Array) -> Array:
-    """Return the scaled loads x = −Fᵀ λ of active rows."""
+def _loads(F: Array, at: Indices, count: int, found: Array) -> Array:
+    """Return the scaled loads x = −Fᵀ λ of the first rows of ``at``."""
     x = np.zeros(F.shape[1])
-    for i in range(len(at)):
+    for i in range(count):
         for m in range(len(x)):
             x[m] -= found[i + 1] * F[at[i], m]
     return x
@@ -192,49 +229,70 @@ def optimum_near(
     met_by, stationarity : float
         Fields ``met`` of `DualSettings` and ``stationarity`` of `SolvingTolerances`.
     """
-    F, size = C / np.sqrt(Q), np.ones(len(C))
-    counts = np.zeros(len(C), dtype=np.bool_)
+    F, size, loads = np.empty(C.shape), np.ones(len(C)), len(Q)
+    counts, active = np.zeros(len(C), dtype=np.bool_), np.zeros(len(C), dtype=np.bool_)
+    whole, usable = 0.0, True
     for i in range(len(C)):
-        square = _product(F[i], F[i])
+        square = 0.0
+        for m in range(loads):
+            F[i, m] = C[i, m] / np.sqrt(Q[m])
+            square += F[i, m] * F[i, m]
         # rows of nothing bind nothing
         counts[i] = square > 0.0
+        usable = usable and (counts[i] or i >= equations)
         if counts[i]:
             size[i] = np.sqrt(square)
-            F[i] /= size[i]
-    d, b = d / size, b / size
-    none = (False, np.zeros(0, dtype=np.intp), Q.copy(), 0.0, np.zeros(0), F[:0])
-    if not (counts[:equations].all() and d.any()):
+            for m in range(loads):
+                F[i, m] /= size[i]
+        whole = max(whole, d[i] / size[i])
+    none = (False, np.zeros(0, dtype=np.intp), np.zeros(0), 0.0, np.zeros(0), np.zeros((0, 0)))
+    if not (usable and whole > 0.0):
         return none
-    whole = 1.0 / d.max()
-    d = d * whole
+    whole = 1.0 / whole
+    scaled, rest = np.empty(len(C)), np.empty(len(C))
+    for i in range(len(C)):
+        scaled[i], rest[i] = whole * d[i] / size[i], b[i] / size[i]
 
-    at = np.flatnonzero(guess & counts)
-    weights = -multipliers[at] * size[at]
-    weights[:equations] = -np.inf
-    at = at[np.argsort(weights, kind="mergesort")]
-    own, start, first = _first(F, d, b, whole, at, equations, dependent, below, starts)
-    count = len(own)
+    # the guess: the equations, then what has the largest multipliers
+    at, count = np.zeros(len(C) + changes, dtype=np.intp), 0
+    for i in range(len(C)):
+        if guess[i] and counts[i]:
+            place = count
+            while place > 0 and i >= equations and at[place - 1] >= equations:
+                other = at[place - 1]
+                if multipliers[other] * size[other] >= multipliers[i] * size[i]:
+                    break
+                at[place] = other
+                place -= 1
+            at[place] = i
+            count += 1
+    count, start, first = _first(
+        F, scaled, rest, whole, at[:count], equations, dependent, below, starts
+    )
     if count == 0:
         return none
-    at = np.zeros(count + changes, dtype=np.intp)
-    at[:count] = own
     # u, then the multipliers of the active rows
-    found = np.zeros(count + changes + 1)
-    found[: count + 1] = start
-    inverse = np.zeros((len(found), len(found)))
-    inverse[: count + 1, : count + 1] = first
+    found, inverse = (
+        np.zeros(count + changes + 1),
+        np.zeros((count + changes + 1, count + changes + 1)),
+    )
+    for i in range(count + 1):
+        found[i] = start[i]
+        for j in range(count + 1):
+            inverse[i, j] = first[i, j]
     slopes, column = np.zeros(len(found)), np.zeros(len(found))
-    active = np.zeros(len(C), dtype=np.bool_)
     changed = 0
     while True:
         # the row that is violated most
-        active[:] = False
-        active[at[:count]] = True
-        x = _loads(F, at[:count], found)
+        for i in range(len(C)):
+            active[i] = False
+        for i in range(count):
+            active[at[i]] = True
+        x = _loads(F, at, count, found)
         entering, most = -1, -row
         for i in range(len(F)):
             if counts[i] and not active[i]:
-                room = (b[i] + d[i] * found[0] - _product(F[i], x)) * size[i]
+                room = (rest[i] + scaled[i] * found[0] - _product(F[i], x)) * size[i]
                 if room < most:
                     entering, most = i, room
         if entering < 0:
@@ -245,14 +303,16 @@ def optimum_near(
             if changed > changes:
                 return none
             # how all change with the multiplier of the row
-            column[0] = d[entering]
-            far = b[entering] + d[entering] * found[0] + multiplier
+            column[0] = scaled[entering]
+            far = rest[entering] + scaled[entering] * found[0] + multiplier
             for i in range(count):
                 column[i + 1] = _product(F[at[i]], F[entering])
                 far += found[i + 1] * column[i + 1]
             rise = 1.0
             for i in range(count + 1):
-                slopes[i] = -_product(inverse[i, : count + 1], column[: count + 1])
+                slopes[i] = 0.0
+                for j in range(count + 1):
+                    slopes[i] -= inverse[i, j] * column[j]
                 rise += column[i] * slopes[i]
             # until the row is met, or another one would pull
             full, step, gone = -far / rise if rise > dependent else np.inf, np.inf, -1
@@ -279,32 +339,42 @@ def optimum_near(
                 count -= 1
 
     # what the kept inverse has lost to rounding is put right
-    at, found, inverse = at[:count], found[: count + 1], inverse[: count + 1, : count + 1].copy()
-    left, exact = np.zeros(count + 1), False
+    left, change, exact = np.zeros(count + 1), np.zeros(count + 1), False
     for steps in range(4):
-        missing = _loads(F, at, found) - x
-        left[0] = whole - _product(d[at], found[1:])
+        missing = _loads(F, at, count, found)
+        still, left[0] = 0.0, whole
+        for m in range(loads):
+            missing[m] -= x[m]
+            still += Q[m] * missing[m] * missing[m]
+        for i in range(count):
+            left[0] -= scaled[at[i]] * found[i + 1]
         most = abs(left[0]) / whole
         for i in range(count):
-            left[i + 1] = _product(F[at[i]], x) - b[at[i]] - d[at[i]] * found[0]
-            most = max(most, abs(left[i + 1]) * size[at[i]])
-            left[i + 1] += _product(F[at[i]], missing)
-        still = np.sqrt(_product(Q * missing, missing))
-        exact = steps > 0 and most <= met_by and still <= stationarity
+            k = at[i]
+            left[i + 1] = _product(F[k], x) - rest[k] - scaled[k] * found[0]
+            most = max(most, abs(left[i + 1]) * size[k])
+            left[i + 1] += _product(F[k], missing)
+        exact = steps > 0 and most <= met_by and np.sqrt(still) <= stationarity
         if exact:
             break
-        change = np.zeros(count + 1)
         for i in range(count + 1):
-            change[i] = _product(inverse[i], left)
-        found += change
-        x += missing + _loads(F, at, change)
+            change[i] = 0.0
+            for j in range(count + 1):
+                change[i] += inverse[i, j] * left[j]
+            found[i] += change[i]
+        moved = _loads(F, at, count, change)
+        for m in range(loads):
+            x[m] += missing[m] + moved[m]
     for i in range(len(F)):
-        room = (b[i] + d[i] * found[0] - _product(F[i], x)) * size[i]
+        room = (rest[i] + scaled[i] * found[0] - _product(F[i], x)) * size[i]
         exact = exact and (active[i] or not counts[i] or room >= -row)
-    signed = np.zeros(len(C))
-    signed[at] = found[1:] / size[at]
+    signed, of_rows = np.zeros(len(C)), np.zeros((count + 1, count + 1))
+    for i in range(count):
+        signed[at[i]] = found[i + 1] / size[at[i]]
     for i in range(count + 1):
+        own = whole if i == 0 else 1.0 / size[at[i - 1]]
         for j in range(count + 1):
-            inverse[i, j] *= whole if i == 0 else 1.0 / size[at[i - 1]]
-            inverse[i, j] *= whole if j == 0 else 1.0 / size[at[j - 1]]
-    return exact, at, x / np.sqrt(Q), found[0] * whole, signed, inverse
+            of_rows[i, j] = inverse[i, j] * own * (whole if j == 0 else 1.0 / size[at[j - 1]])
+    for m in range(loads):
+        x[m] /= np.sqrt(Q[m])
+    return exact, at[:count], x, found[0] * whole, signed, of_rows

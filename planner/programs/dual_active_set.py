@@ -35,7 +35,7 @@ from planner.programs.active_set import (
     optimum,
 )
 
-__all__ = ["DualFace", "dual_optimum"]
+__all__ = ["DualFace", "dual_optimum", "load_dual_method"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,3 +130,8 @@ def dual_optimum(rows: Rows, Q: Array, start: Point, guess: Mask) -> Optimum | N
         return optimum(rows, Q, start, active, 3)
     except ApartError:
         return None
+
+
+def load_dual_method() -> None:
+    """Import what numba compiles for `dual_optimum`, so that no question waits for it."""
+    from planner.programs import compiled_dual  # noqa: F401

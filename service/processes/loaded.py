@@ -8,7 +8,9 @@ import scipy.spatial  # noqa: F401
 import trimesh  # noqa: F401
 
 from hand_models.hand import load_closing
+from planner import load_dual_method
 from service.answering import Streams, handle, robots_of  # noqa: F401
 
 load_closing()
+load_dual_method()
 robots_of(None)
