@@ -365,9 +365,10 @@ def optimum_near(
         moved = _loads(F, at, count, change)
         for m in range(loads):
             x[m] += missing[m] + moved[m]
+    # rows of nothing, too, which u alone may violate
     for i in range(len(F)):
         room = (rest[i] + scaled[i] * found[0] - _product(F[i], x)) * size[i]
-        exact = exact and (active[i] or not counts[i] or room >= -row)
+        exact = exact and (active[i] or room >= -row)
     signed, of_rows = np.zeros(len(C)), np.zeros((count + 1, count + 1))
     for i in range(count):
         signed[at[i]] = found[i + 1] / size[at[i]]

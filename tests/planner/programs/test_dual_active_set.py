@@ -67,3 +67,16 @@ def test_there_is_no_start_without_a_limit(stance):
     rows, Q, (point, _), *_ = stance
     equations = np.arange(len(rows.b)) < rows.equations
     assert dual_optimum(rows, Q, point, equations) is None
+
+
+def test_a_row_of_nothing_that_only_more_utilisation_meets_is_met(stance):
+    rows, Q, (point, face), *_ = stance
+    least = point.u + 0.1
+    C, d, b = (
+        np.append(part, [more], axis=0)
+        for part, more in zip(rows[:3], (np.zeros(len(Q)), 1.0, -least), strict=True)
+    )
+    multipliers = np.append(point.multipliers, 0.0)
+    start, guess = point._replace(multipliers=multipliers), np.append(face.active, False)
+    found = dual_optimum(Rows(C, d, b, rows.equations), Q, start, guess)
+    assert found is None or found.point.u == pytest.approx(least, abs=1e-9)
