@@ -61,7 +61,8 @@ def test_the_rest_grows_while_no_process_can_be_started(
     assert rests == [min(first * 2.0**i, longest) for i in range(8)]
     assert rests[0] < rests[-1] == longest
     assert len(caplog.messages) == 8
-    assert caplog.messages[1] == (
+    # which file could not be opened is said, if one has a name
+    assert caplog.messages[1].startswith(
         "no process can be started, again in 2 s: [Errno 24] Too many open files"
     )
     assert not found.work
