@@ -138,6 +138,35 @@ class ApartError(Exception):
     """Error: the active rows have no common point, or Newton's iteration does not converge."""
 
 
+class OptimalFace(Protocol):
+    """The points at which a set of rows is active.
+
+    Attributes
+    ----------
+    active : ndarray of bool, shape (k,)
+        Mask of the active rows.
+    Q : ndarray, shape (M,)
+        Diagonal of the curvature at a weight of 1.
+    """
+
+    @property
+    def active(self) -> Mask: ...
+
+    @property
+    def Q(self) -> Array: ...
+
+    def keeps(self, least: Point, weight: float) -> bool:
+        """Return whether the least point of the face remains the optimum at another weight.
+
+        Parameters
+        ----------
+        least : Point
+            Least point of the face at a weight of 1.
+        weight : float
+            The other weight of the quadratic term.
+        """
+
+
 class ActiveFace:
     """The points at which a set of rows is active, factorised for Newton's steps.
 
@@ -217,17 +246,9 @@ class ActiveFace:
         raise ApartError
 
     def keeps(self, least: Point, weight: float) -> bool:
-        """Return whether the least point of the face remains the optimum at another weight.
+        """Return whether the least point remains the optimum, as of `OptimalFace.keeps`.
 
-        The point remains optimal if multipliers of the same rows, none of them negative, balance
-        the scaled gradient.
-
-        Parameters
-        ----------
-        least : Point
-            Least point of the face at a weight of 1.
-        weight : float
-            The other weight of the quadratic term.
+        It does if multipliers of the same rows, none of them negative, balance the scaled gradient.
         """
         r1 = -weight * self.Q * least.z - least.multipliers[self.active] @ self.C
         step = (self.root @ (self.flexible @ r1)) @ self.root
@@ -238,35 +259,6 @@ class ActiveFace:
         return bool(
             multipliers[self.equations :].min(initial=0.0) >= -TOLERANCES.multiplier * weight
         )
-
-
-class OptimalFace(Protocol):
-    """The points at which a set of rows is active.
-
-    Attributes
-    ----------
-    active : ndarray of bool, shape (k,)
-        Mask of the active rows.
-    Q : ndarray, shape (M,)
-        Diagonal of the curvature at a weight of 1.
-    """
-
-    @property
-    def active(self) -> Mask: ...
-
-    @property
-    def Q(self) -> Array: ...
-
-    def keeps(self, least: Point, weight: float) -> bool:
-        """Return whether the least point of the face remains the optimum at another weight.
-
-        Parameters
-        ----------
-        least : Point
-            Least point of the face at a weight of 1.
-        weight : float
-            The other weight of the quadratic term.
-        """
 
 
 class Optimum(NamedTuple):

@@ -272,10 +272,8 @@ def optimum_near(
     if count == 0:
         return none
     # u, then the multipliers of the active rows
-    found, inverse = (
-        np.zeros(count + changes + 1),
-        np.zeros((count + changes + 1, count + changes + 1)),
-    )
+    largest = count + changes + 1
+    found, inverse = np.zeros(largest), np.zeros((largest, largest))
     for i in range(count + 1):
         found[i] = start[i]
         for j in range(count + 1):

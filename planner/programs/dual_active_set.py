@@ -78,10 +78,7 @@ class DualFace(NamedTuple):
     inverse: Array
 
     def keeps(self, least: Point, weight: float) -> bool:
-        """Return whether the least point of the face remains the optimum at another weight.
-
-        Parameters and reason as of `ActiveFace.keeps`.
-        """
+        """Return whether the least point remains the optimum, as of `OptimalFace.keeps`."""
         C, multipliers = self.rows.C[self.at], least.multipliers[self.at]
         for _ in range(3):
             missing = weight * self.Q * least.z + multipliers @ C
