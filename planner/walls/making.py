@@ -9,7 +9,9 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from hashlib import sha256
+from itertools import product
 from typing import Any, Protocol
 
 import msgspec
@@ -296,29 +298,21 @@ def _reach(
     stays so whatever these are.
     """
     rows, lost = _rows(poses), set[int]()
-    cut = [slice(i, i + source.together) for i in range(0, len(rows), source.together)]
+    groups = [rows[i : i + source.together] for i in range(0, len(rows), source.together)]
     parts = [each for each in _parts(bodies) if each]
     digests = [sha256(repr(_rows(part)).encode()).hexdigest() for part in parts]
-    chunks = [
-        Chunk(poses=rows[group], bodies=digest, given=i > 0)
-        for i, digest in enumerate(digests)
-        for group in cut
-    ]
+    asked = list(product(range(len(parts)), range(len(groups))))
+    chunks = [Chunk(poses=groups[g], bodies=digests[i], given=i > 0) for i, g in asked]
     questions = [msgspec.msgpack.encode(chunk) for chunk in chunks]
-    tables = list[ReachTable]()
-    for i, answer in enumerate(_asked("reach", questions, ask, report)):
+    tables = [list[ReachTable]() for _ in parts]
+    for (i, g), answer in zip(asked, _asked("reach", questions, ask, report), strict=True):
         if answer is None:
-            part, group = parts[i // len(cut)], range(len(rows))[cut[i % len(cut)]]
-            lost |= {*group}
-            tables.append(_unknown(len(group), len(part), source.robot))
+            lost.add(g)
+            tables[i].append(_unknown(len(groups[g]), len(parts[i]), source.robot))
         else:
-            tables.append(ReachTable(**answer))
-    whole, *others = [
-        ReachTable.joined(tables[i * len(cut) : (i + 1) * len(cut)]) for i in range(len(parts))
-    ]
-    for other in others:
-        whole = whole.beside(other)
-    return whole, len(lost)
+            tables[i].append(ReachTable(**answer))
+    whole = reduce(ReachTable.beside, map(ReachTable.joined, tables))
+    return whole, sum(len(groups[g]) for g in lost)
 
 
 def _parts(bodies: BodyPoses) -> tuple[Sequence[Pose], Sequence[Pose]]:

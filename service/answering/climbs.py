@@ -117,12 +117,12 @@ def seek_climb(
         more_bodies=[body for body, _ in stances.values()],
     )
     progress = _Progress(request.id, report)
-    search = partial(_search, request, stances, progress, make)
+    part = None if request.time is None else request.time / (request.refine + 1)
+    search = partial(_search, request, stances, progress, make, part)
     sought = search(source, request.refine)
     for times in range(1, request.refine + 1):
         if sought.found.status == "found" or deadline.expired():
             break
-        part = None if request.time is None else request.time / (request.refine + 1)
         state = weakest_state(sought.found, sought.start, sought.goal, part)
         if state is None:
             break
@@ -139,6 +139,7 @@ def _search(
     stances: Mapping[str, tuple[Pose, Mapping[str, object]]],
     progress: _Progress,
     make: Callable[[WallSource, WallProgress], MadeWall] | None,
+    part: float | None,
     source: WallSource,
     later: int,
 ) -> SoughtClimb:
@@ -148,6 +149,8 @@ def _search(
     ----------
     stances : mapping of str to tuple
         Ends of the climb that are stances: body, and hands by path in the request.
+    part : float or None
+        Time that the search may take [s].
     later : int
         Number of searches that may come after this one, in the time that is left.
     """
@@ -155,7 +158,7 @@ def _search(
 
     bodies, ends = source.poses(), {"start": request.start, "goal": request.goal}
     origins = np.array([body.position for body in bodies.poses])
-    its_body = dict(zip(stances, bodies.given, strict=False))
+    its_body = dict(zip(stances, bodies.given[: len(stances)], strict=True))
     at = {
         name: np.arange(len(origins)) == its_body[name]
         if name in its_body
@@ -175,7 +178,7 @@ def _search(
     left = deadline.left()
     # the rest of the time is for the changes that would raise the load factor, and for the reply
     most = math.inf if left is None else 0.95 * left / (later + 1)
-    seconds = min(most, (request.time or math.inf) / (request.refine + 1))
+    seconds = min(most, part or math.inf)
     found = find_climb(
         made.wall,
         start,
