@@ -32,5 +32,5 @@ from .gripper import (
 )
 from .inverse import WristPose as WristPose, wrist_pose as wrist_pose
 from .linear_pieces import pieces as pieces
+from .link import Numbers as Numbers
 from .pose_box import linear_box as linear_box, search_box as search_box
-from .rolling import Numbers as Numbers

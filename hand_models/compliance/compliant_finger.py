@@ -23,13 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.base import Array
-from hand_models.compliance.rolling import (
-    MovedPosture,
-    Numbers,
-    RollingContact,
-    across,
-    dot,
-)
+from hand_models.compliance.link import Numbers, across, dot
+from hand_models.compliance.rolling import MovedPosture, RollingContact
 from hand_models.finger import PHALANGES, SettledFinger
 from hand_models.sections import Section
 from hand_models.tendon import FingerTendon, MotorScheme, TendonRegimes, pad_tiles

@@ -21,7 +21,7 @@ from hand_models.base import Array, Indices, InvalidInputError, UnsupportedError
 from hand_models.compliance.compliant_finger import CompliantFingers, FingerAtRest, FingerLoads
 from hand_models.compliance.grasp import complex_steps, slopes
 from hand_models.compliance.hand_springs import PalmSprings, lateral_stiffness
-from hand_models.compliance.rolling import Numbers, across
+from hand_models.compliance.link import Numbers, across
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.tendon import FingerTendon, MotorScheme

@@ -16,7 +16,7 @@ from hand_models.base import Array
 from hand_models.compliance.compliant_hand import CompliantHand, CompliantHands, HandLoads
 from hand_models.compliance.floating_wrist import WRIST_COLUMNS, FloatingWrist
 from hand_models.compliance.grasp import LoadRows, complex_steps, rows_of_range
-from hand_models.compliance.rolling import Numbers
+from hand_models.compliance.link import Numbers
 from hand_models.hand import FINGERS, WristTravel
 from hand_models.wrench_spaces import Row
 

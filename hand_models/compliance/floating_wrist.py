@@ -29,7 +29,7 @@ from hand_models.compliance.grasp import (
     complex_steps,
     rows_of_range,
 )
-from hand_models.compliance.rolling import Numbers
+from hand_models.compliance.link import Numbers
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import layout_of, twist_arms
 from hand_models.hand import FINGERS, HELD_DIRECTIONS

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hand_models.base import BASE_TOLERANCES, Array, Indices
 from hand_models.compliance.compliant_finger import COMPLEX_STEP
-from hand_models.compliance.rolling import Numbers
+from hand_models.compliance.link import Numbers
 from hand_models.wrench_spaces import Row, WrenchSpace
 
 __all__ = [

@@ -17,7 +17,7 @@ import numpy as np
 from hand_models.base import InvalidInputError, check_positive
 from hand_models.compliance.compliant_finger import CompliantFingers, FingerAtRest, FingerLoads
 from hand_models.compliance.grasp import CompliantGrasp, GraspLoads, LoadRows, rows_of_range
-from hand_models.compliance.rolling import Numbers
+from hand_models.compliance.link import Numbers
 from hand_models.finger import PHALANGES, FingerModel, settle_finger
 from hand_models.fixed_wrist import named_row
 from hand_models.parameters import ParameterTable, Quantity, experiment_table, hand_table

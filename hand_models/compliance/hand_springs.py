@@ -19,7 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hand_models.base import Array
-from hand_models.compliance.rolling import Numbers
+from hand_models.compliance.link import Numbers
 from hand_models.hand import SettledHand
 
 __all__ = ["PalmSprings", "lateral_stiffness"]

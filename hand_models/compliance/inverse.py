@@ -23,7 +23,7 @@ from hand_models.compliance.compliant_hand import CompliantHand
 from hand_models.compliance.directional_limit import pose_units
 from hand_models.compliance.floating_wrist import WRIST_COLUMNS
 from hand_models.compliance.grasp import complex_steps, slopes
-from hand_models.compliance.rolling import Numbers
+from hand_models.compliance.link import Numbers
 from hand_models.wrench_spaces import WRENCH_SCALE
 
 __all__ = ["WristPose", "wrist_pose"]

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from hand_models.compliance import COMPLEX_STEP
-from hand_models.compliance.rolling import MovedPosture, RollingContact, bearing_angle
+from hand_models.compliance.link import STANDING_ANGLE, FingerLink, bearing_angle
+from hand_models.compliance.rolling import MovedPosture, RollingContact
 from hand_models.finger import settle_finger
 from hand_models.hand import FINGERS, Grasp
 from hand_models.rock import Cylinder, Edge, Ellipsoid, Plane, Sphere
@@ -142,3 +143,65 @@ def test_an_edge_hold_is_met_with_points_that_slide():
     for finger in FINGERS:
         resettling, _ = moving(hold, grasp, finger)
         assert move(resettling, 1e-5, -1e-5, 1e-4).reached[0]
+
+
+LENGTH = 0.04
+"""From a joint to the point of a phalanx that slides along flat rock [m]."""
+
+
+def leaning(angle):
+    """Return a phalanx whose point slides on a flat rock, so far from the rock's normal [rad]."""
+    place = np.array([math.sin(angle), math.cos(angle)]) * LENGTH
+    fields = {
+        "bearing": 0,
+        "contact": LENGTH,
+        "flat": True,
+        "rest": place / LENGTH,
+        "raised": (0.0, 0.0),
+        "centre": place,
+        "into": (0.0, 1.0),
+        "back": (-1.0, 0.0),
+    }
+    one = FingerLink(*(np.array([value])[..., None] for value in FingerLink(**fields)))
+    return one.settled(np.zeros((1, 2, 1)))
+
+
+def turn_of(link, approach):
+    """Return turn and slip of a phalanx whose joint has come nearer to the rock [rad, m]."""
+    joint = np.stack([0.0 * approach, approach])[None]
+    with np.errstate(invalid="ignore"):
+        way, _, slip = link.turn(joint)
+        return bearing_angle(way[:, 0], way[:, 1])[0], slip[0]
+
+
+@given(st.floats(0.0, 1.2))
+def test_a_phalanx_has_neither_turned_nor_slipped_at_rest_however_it_stands(angle):
+    turn, slip = turn_of(leaning(angle), np.zeros(1))
+    assert turn == pytest.approx(0.0, abs=1e-12)
+    assert slip == pytest.approx(0.0, abs=1e-14)
+
+
+@given(st.floats(STANDING_ANGLE + 0.01, 1.2), st.floats(0.0, 2e-3))
+def test_a_leaning_phalanx_turns_by_the_arc_cosine(angle, approach):
+    turn, slip = turn_of(leaning(angle), np.array([approach]))
+    leans = math.acos(math.cos(angle) - approach / LENGTH)
+    # x toward z: leaning farther turns it back toward x
+    assert turn[0] == pytest.approx(angle - leans, abs=1e-11)
+    assert slip[0] == pytest.approx(-LENGTH * (math.sin(leans) - math.sin(angle)), abs=1e-12)
+
+
+@given(st.floats(0.0, 0.3), st.floats(-1e-4, 2e-3))
+def test_no_way_of_the_base_turns_a_phalanx_without_bound(angle, approach):
+    link = leaning(angle)
+    turn, _ = turn_of(link, np.array([approach + 1j * COMPLEX_STEP]))
+    assert abs(turn.imag[0]) / COMPLEX_STEP <= 1.001 / (LENGTH * math.sin(STANDING_ANGLE))
+    # nor does it jump where the arm begins to stay as it is
+    near, _ = turn_of(link, approach + np.array([0.0, 1e-9]))
+    assert abs(near[1] - near[0]) < 1e-6
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.05, 0.2])
+@pytest.mark.parametrize("step", [0.0, 1j * COMPLEX_STEP])
+def test_a_phalanx_loses_the_rock_that_it_no_longer_reaches(angle, step):
+    turn, _ = turn_of(leaning(angle), np.array([-0.15 * LENGTH + step]))
+    assert np.isnan(turn[0])
