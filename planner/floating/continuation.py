@@ -17,7 +17,13 @@ import numpy as np
 
 from planner import deadline
 from planner.deadline import Budget
-from planner.floating.elastic_search import find_wrists, first_plan, most_programs, pressing
+from planner.floating.elastic_search import (
+    find_wrists,
+    first_plan,
+    most_programs,
+    other_starts,
+    pressing,
+)
 from planner.floating.goals import SETTINGS
 from planner.floating.wrist_iteration import WristSolution
 from planner.prepare import TOLERANCES, HandSets
@@ -85,6 +91,12 @@ def least_use(
         # driven hands with their bounded travel hardly reach it
         there = find_wrists(hands, pressing(hands, 1.0), budget.part(first), SETTINGS.rounds_nearby)
         plan = _better(plan, there)
+    for start in other_starts(hands) if near is None else ():
+        if _held(plan) or deadline.expired():
+            break
+        there = find_wrists(hands, start, budget.part(first))
+        if not (plan.exact and _as_good(plan, there)):  # of two as good, the first may be proven
+            plan = _better(plan, there)
     if deadline.expired():
         return plan, None
     most: LargestFactor | None = None

@@ -41,6 +41,7 @@ __all__ = [
     "firm_rows",
     "first_plan",
     "most_programs",
+    "other_starts",
     "pressing",
     "without_hindrance",
 ]
@@ -123,12 +124,34 @@ def _starts(hands: HandSets, factor: float, budget: Budget) -> Iterator[Linearis
     if hands.springy and hands.together is None:
         yield pressing(hands, factor)
     if hands.together is not None:
-        # closed harder, tiles are farther from being dragged backwards
-        loads = [
-            y if wrist is None or not wrist.driven else np.where(np.arange(len(y)) < 4, 80.0, y)
-            for wrist, y in zip(hands.wrists, rest.loads, strict=True)
-        ]
-        yield replace(rest, loads=tuple(loads))
+        yield _closed_harder(hands, rest)
+
+
+def other_starts(hands: HandSets) -> tuple[LinearisationPoint, ...]:
+    """Return starts for compliant hands of which the first plan is beyond limits, or none.
+
+    The search is local, and on rough rock it may end where fingers that are about to be dragged
+    backwards keep their wrists back: from the hands at rest, and from hands that are closed harder,
+    it ends elsewhere. Empty if no hand is compliant.
+
+    Parameters
+    ----------
+    hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
+    """
+    if hands.together is None:
+        return ()
+    rest = hands.at_rest()
+    return _closed_harder(hands, rest), rest
+
+
+def _closed_harder(hands: HandSets, rest: LinearisationPoint) -> LinearisationPoint:
+    """Return a point at which tiles of driven hands are farther from being dragged backwards."""
+    loads = [
+        y if wrist is None or not wrist.driven else np.where(np.arange(len(y)) < 4, 80.0, y)
+        for wrist, y in zip(hands.wrists, rest.loads, strict=True)
+    ]
+    return replace(rest, loads=tuple(loads))
 
 
 def find_wrists(

@@ -28,7 +28,7 @@ __all__ = ["LEAST_USE", "SETTINGS", "FloatingSettings", "Goal", "LeastUse", "ben
 class FloatingSettings:
     """Sizes and tolerances of the search for poses of floating and compliant wrists."""
 
-    programs: int = 320
+    programs: int = 640
     """Largest number of conic programs for one question.
 
     Then the best plan found is returned. Four floating hands take some ten seconds."""
