@@ -31,6 +31,8 @@ from .climbs import (
     RefusedMoves as RefusedMoves,
     find_climb as find_climb,
     weakest_state as weakest_state,
+    with_compliant_stages as with_compliant_stages,
+    with_compliant_wrists as with_compliant_wrists,
 )
 from .deadline import (
     DeadlineError as DeadlineError,

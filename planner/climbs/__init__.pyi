@@ -1,5 +1,10 @@
 from .finding import ClimbProgress as ClimbProgress, find_climb as find_climb
-from .found_climb import FoundClimb as FoundClimb, weakest_state as weakest_state
+from .found_climb import (
+    FoundClimb as FoundClimb,
+    weakest_state as weakest_state,
+    with_compliant_stages as with_compliant_stages,
+    with_compliant_wrists as with_compliant_wrists,
+)
 from .move_checks import MoveChecks as MoveChecks
 from .other_bodies import detours as detours
 from .outcome import (

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from hand_models.hand import WristTravel
 from planner.climbs.outcome import ClimbStatus, DecidingStage, Raise, RefusedMoves
 from planner.climbs.routing import ClimbStep
-from planner.question import Question
-from planner.route import Climb, Route, RouteResult
+from planner.deadline import DeadlineError
+from planner.question import HandOnHold, Question
+from planner.route import Climb, Route, RouteResult, evaluate
 from planner.search import Ends, Found, State, Wall, search
 
-__all__ = ["FoundClimb", "deciding_stage", "weakest_state", "with_joints"]
+__all__ = [
+    "FoundClimb",
+    "deciding_stage",
+    "weakest_state",
+    "with_compliant_stages",
+    "with_compliant_wrists",
+    "with_joints",
+]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -45,6 +56,8 @@ class FoundClimb:
         Moves of found states that have no plan, by kind.
     seconds : dict of str to float
         Duration of each phase [s].
+    compliant : RouteResult or None
+        Plans of the same stages with wrists that give; None unless they were asked for and planned.
     """
 
     status: ClimbStatus
@@ -60,6 +73,7 @@ class FoundClimb:
     raised: tuple[Question, ...] = ()
     refused: tuple[RefusedMoves, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
+    compliant: RouteResult | None = None
 
     @property
     def gap(self) -> float | None:
@@ -93,6 +107,53 @@ def with_joints(climb: Climb) -> Route:
             for move, angles in zip(route.moves, placed, strict=True)
         ),
     )
+
+
+def with_compliant_wrists(route: Route, travel: WristTravel | None = None) -> Route:
+    """Return a route whose hands have compliant wrists, with a travel; nails stay fixed.
+
+    Parameters
+    ----------
+    route : Route
+    travel : WristTravel, optional
+        Range in which wrists may settle; `WristTravel` by default.
+    """
+
+    def giving(hand: HandOnHold) -> HandOnHold:
+        if hand.grasp.fingernail:
+            return hand
+        return replace(hand, wrist="compliant", wrist_travel=travel)
+
+    start = replace(route.start, hands=tuple(map(giving, route.start.hands)))
+    moves = tuple(replace(move, hand=giving(move.hand)) for move in route.moves)
+    return replace(route, start=start, moves=moves)
+
+
+def with_compliant_stages(
+    found: FoundClimb,
+    travel: WristTravel | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> FoundClimb:
+    """Return a climb whose stages are planned with compliant wrists, too, in its joint angles.
+
+    Without a climb, or if the deadline passes before all stages are planned, it stays as it is.
+
+    Parameters
+    ----------
+    found : FoundClimb
+    travel : WristTravel, optional
+        Range in which wrists may settle.
+    progress : callable, optional
+        Called after each stage with (number of stages planned, number of stages).
+    """
+    if found.route is None:
+        return found
+    begun, route = time.perf_counter(), with_compliant_wrists(found.route, travel)
+    with suppress(DeadlineError):
+        plans = evaluate(route, workers=1, progress=progress, climb=found.climb)
+        seconds = found.seconds | {"compliant": time.perf_counter() - begun}
+        return replace(found, compliant=plans, seconds=seconds)
+    return found
 
 
 def deciding_stage(

@@ -84,7 +84,7 @@ def seek_climb(
     DeadlineError
         If the deadline passes before there is a wall to search.
     """
-    from planner import WallSource, finer_about, weakest_state
+    from planner import WallSource, finer_about, weakest_state, with_compliant_stages
 
     build = builder_of(request.robot, robots)
     with errors_under("hand"):
@@ -131,7 +131,10 @@ def seek_climb(
         # without a climb, that there is none among more placements says more
         if best is None or (again.found.least or 0.0) > best:
             sought = again
-    return sought
+    if request.wrist == "fixed":
+        return sought
+    say = partial(progress.compliant, sought.found)
+    return sought._replace(found=with_compliant_stages(sought.found, request.wrist_travel, say))
 
 
 def _search(
@@ -232,6 +235,8 @@ def climb_reply(
         about=found.about,
         route=None if found.route is None else route_request(request, found.route),
         stages=[] if found.result is None else stage_replies(found.result),
+        least_compliant=None if found.compliant is None else found.compliant.load_factor,
+        stages_compliant=[] if found.compliant is None else stage_replies(found.compliant),
         knots=None if found.climb is None else len(found.climb.knots),
         placements=len(wall.places),
         bodies=len(wall.bodies),
@@ -375,6 +380,10 @@ class _Progress:
     def search(self, now: ClimbProgress) -> None:
         """Report how far the search of the wall is."""
         self._tell(now.phase, now.best, now.bound, now.done, now.total)
+
+    def compliant(self, found: FoundClimb, done: int, total: int) -> None:
+        """Report how many stages are planned with compliant wrists."""
+        self._tell("compliant", found.least, _finite(found.bound), done, total)
 
     def _tell(
         self, phase: str, best: float | None, bound: float | None, done: int, total: int

@@ -181,7 +181,8 @@ def _hand_fields(asked: requests.ClimbRequest, hand: HandOnHold) -> dict[str, An
     hold = requests.RockReference(rock="rock", pose_in_hand=pose_of_request(hand.hold_in_hand))
     surface, grasp = asked.surface, hand.grasp
     own = {"limb": hand.limb, "pose": pose_of_request(hand.pose), "hold": hold}
-    return own | {"surface": surface, "grasp": grasp}
+    wrist = {"wrist": hand.wrist, "wrist_travel": hand.wrist_travel}
+    return own | {"surface": surface, "grasp": grasp} | wrist
 
 
 def pose_of_request(pose: Pose) -> requests.PoseMessage:

@@ -171,6 +171,8 @@ def _climb_columns() -> Iterator[Column]:
     yield Column("least", "float", "1", "least load factor of all stages; empty without a climb")
     yield Column("bound", "float", "1", "no other climb has a larger least load factor")
     yield Column("gap", "float", "1", "how much larger the bound is, as a part of the least")
+    meaning = "the least of all stages with compliant wrists; empty unless asked for"
+    yield Column("least_compliant", "float", "1", meaning)
     yield Column("moves", "int", "1", "of limbs, in the climb")
     yield Column("knots", "int", "1", "of the climb's trajectory")
     for name, what in (("placements", "of hands"), ("bodies", "poses of the body")):

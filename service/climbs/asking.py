@@ -6,11 +6,12 @@ from collections.abc import Callable
 from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import msgspec
 
 from hand_models.base import InvalidInputError, errors_under
+from hand_models.hand import WristTravel
 from planner import BodyGrid, PlaceGrid
 from service import requests, wire
 from service.climbs.rocks import rock_message
@@ -33,6 +34,8 @@ class Sought(NamedTuple):
     body_spacing: float | None
     stand_off: tuple[float, ...]
     lean: float
+    wrist: Literal["fixed", "compliant"] | None
+    wrist_travel: tuple[float, float, float] | None
 
     def asking(
         self, read: Callable[[str], requests.PlanRequest]
@@ -59,6 +62,10 @@ class Sought(NamedTuple):
             place_grid = PlaceGrid(**places)
         with errors_under("bodies"):
             body_grid = BodyGrid(**bodies)
+        travel = None
+        if self.wrist_travel is not None:
+            with errors_under("wrist_travel"):
+                travel = WristTravel(*self.wrist_travel)
         request = partial(
             requests.ClimbRequest,
             v=1,
@@ -71,6 +78,8 @@ class Sought(NamedTuple):
             refine=self.refine,
             start=climb_end(self.start, "--from", self.radius, read),
             goal=climb_end(self.goal, "--to", self.radius, read),
+            wrist=self.wrist or "fixed",
+            wrist_travel=travel,
         )
         return lambda rock: request(name=rock.stem, rock=rock_message(rock, self.lean))
 

@@ -91,6 +91,7 @@ def write_search(
         "rock": folder / "rock.ply",
         "certificate": folder / "certificate.npz",
         "route": folder / "route.json",
+        "compliant route": folder / "compliant.json",
     }
     planner.write_wall(wall, files["wall"], request.name)
     planner.plot_wall(found, sought.rock, sought.rock_pose, files["picture of the wall"])
@@ -100,14 +101,18 @@ def write_search(
         planner.climb_certificate(wall, sought.start, sought.goal, found.found).write(
             files["certificate"]
         )
-    if found.route is None:
-        for name in ("rock", "route"):
+    compliant = None if found.compliant is None else found.compliant.route
+    for name, route in {"route": found.route, "compliant route": compliant}.items():
+        if route is None:
             files.pop(name).unlink(missing_ok=True)
-        return files
-    write_rock(sought.rock.triangles, files["rock"])
-    given = answering.route_request(request, found.route)
-    pose = answering.pose_of_request(sought.rock_pose)
-    rocks = {"rock": requests.MeshMessage(file=files["rock"].name, pose=pose)}
-    stance = msgspec.structs.replace(given.stance, rocks=rocks)
-    write_stance(msgspec.structs.replace(given, stance=stance), files["route"])
+            continue
+        given = answering.route_request(request, route)
+        pose = answering.pose_of_request(sought.rock_pose)
+        rocks = {"rock": requests.MeshMessage(file=files["rock"].name, pose=pose)}
+        stance = msgspec.structs.replace(given.stance, rocks=rocks)
+        write_stance(msgspec.structs.replace(given, stance=stance), files[name])
+    if found.route is None:
+        files.pop("rock").unlink(missing_ok=True)
+    else:
+        write_rock(sought.rock.triangles, files["rock"])
     return files

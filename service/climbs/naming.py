@@ -49,6 +49,8 @@ def _name_options(error: CruxError | ErrorDetail) -> None:
         "start": "--from",
         "goal": "--to",
         "time": "--time",
+        "wrist_travel": "--wrist-travel",
+        "wrist": "--wrist",
     }
     for path, option in options.items():
         error.message = error.message.replace(f"({path})", f"({option})")

@@ -83,6 +83,11 @@ def verdict_sentences(
         limit = f"; {reason}" if reason else ""
         move = f"move {deciding.move}, " if deciding.move else ""
         yield f"stage {deciding.stage} decides ({move}{what}; {where}){limit}"
+    if found.compliant is not None:
+        plans, least = found.compliant.plans, found.compliant.load_factor
+        held = sum(plan.status == "optimal" for plan in plans)
+        said = "some have no load factor" if least is None else f"least load factor {least:.3f}"
+        yield f"with compliant wrists {held} of {counted(len(plans), 'stage')} hold; {said}"
     for each in found.raises[: 3 * raises]:
         yield f"  {each.load_factor:.3f} in that stage with {each.change}"
     for kind in found.refused[:3]:

@@ -92,9 +92,8 @@ def route_command(
         unexplained = wanted.unexplained
         return _many(listing, sources, output, resume, parallel, own, as_json, unexplained)
     if parallel.dask is not None:
-        raise InvalidInputError(
-            f"requires -o FILE that ends in {batch.LISTED_ENDINGS}", field="--dask"
-        )
+        said = f"requires -o FILE that ends in {batch.LISTED_ENDINGS}"
+        raise InvalidInputError(said, field="--dask")
     return _one(_Asked.of(routes, wanted, own), output, page, parallel.workers, own, as_json)
 
 
@@ -104,6 +103,8 @@ def _above(name: str, text: str, most: float = 1e3, **more: Any) -> Any:
 
 
 END_FORMS: Final = "x,y,z in W, height:Z, or a stance"
+WRIST_HELP: Final = "compliant: plan the stages of the climb with wrists that give, too."
+TRAVEL_HELP: Final = "Of compliant wrists: either way, toward the rock, turn [m, m, rad]."
 REFINE_HELP: Final = "That the weakest stage gets more places and poses, and all is searched again."
 
 sought_options = options.asked_for(
@@ -133,6 +134,8 @@ sought_options = options.asked_for(
         show_default=True,
         help="Of a mesh's x from the vertical, away from the climber [rad].",
     ),
+    click.option("--wrist", type=click.Choice(["fixed", "compliant"]), help=WRIST_HELP),
+    click.option("--wrist-travel", type=(float, float, float), help=TRAVEL_HELP),
 )
 
 
@@ -330,9 +333,8 @@ def _stage(
     route = answering.route_of(asked.request, own.robots)
     known = tuple(planner.stages(route))
     if index >= len(known):
-        raise InvalidInputError(
-            f"must be below {len(known)}, the number of stages, got {index}", field="--stage"
-        )
+        said = f"must be below {len(known)}, the number of stages, got {index}"
+        raise InvalidInputError(said, field="--stage")
     stage = known[index]
     # later moves have a say in the joint angles, so that they can be kept
     with tables.working(f"planning the moves of {route.name}"):
@@ -361,16 +363,13 @@ def _many(
 ) -> int:
     """Answer any number of routes or climbs, and keep their results."""
     if any(os.path.abspath(name) == os.path.abspath(file) for name in sources.names):
-        raise InvalidInputError(
-            f"{file} is one of the {listing.noun} and would be overwritten; name another file",
-            field="-o",
-        )
+        said = f"{file} is one of the {listing.noun} and would be overwritten; name another file"
+        raise InvalidInputError(said, field="-o")
     tables.write_alone(file)
     begun = perf_counter()
     if file.suffix.lower() == ".jsonl" and file.exists() and not file.is_file():
-        raise InvalidInputError(
-            f"{file}: must be a file, not a device or pipe; name another", field="-o"
-        )
+        said = f"{file}: must be a file, not a device or pipe; name another"
+        raise InvalidInputError(said, field="-o")
     sink = batch.new_run(
         file, sources, lambda: listing.columns, own, explained=not unexplained, resume=resume
     )

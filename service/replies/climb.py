@@ -147,8 +147,8 @@ class ClimbFailureReply(Struct, kw_only=True):
 class SearchProgress(Struct, kw_only=True):
     """Progress of the search for a climb.
 
-    - ``phase``: what is being done: ``placements``, ``reach``, ``sets``, ``search``, ``moves`` or
-      ``stages``.
+    - ``phase``: what is being done: ``placements``, ``reach``, ``sets``, ``search``, ``steps``,
+      ``moves``, ``stages``, ``changes`` or ``compliant``.
     - ``best``: least load factor of the best route so far; null before there is one.
     - ``bound``: no route has a larger least load factor; null before there is a bound.
     - ``gap``: how much larger than ``best`` the bound is, as a part of ``best``; null without one

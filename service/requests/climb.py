@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, field
 
 from hand_models.base import Coordinate, InvalidFieldError, Name, Position, Strict
-from hand_models.hand import Grasp
+from hand_models.hand import Grasp, WristTravel
 from planner import BodyGrid, Limits, PlaceGrid
 from service.requests.holds import MeshMessage, SurfaceMessage
 from service.requests.questions import ObjectiveName
@@ -94,6 +94,9 @@ class ClimbRequest(Query, frozen=True, kw_only=True):
     - ``start``, ``goal``: where the climb begins and ends.
     - ``places``, ``bodies``: grids on which hands are tried and the body may be.
     - ``limits``, ``objective``: of every stage, as in a plan's request.
+    - ``wrist``: ``compliant``: the stages of the climb that is found are planned with wrists that
+      give, too. Search, moves and bound are about fixed wrists.
+    - ``wrist_travel``: range in which compliant wrists may come to rest.
     - ``best_within``: the search ends when no other climb can have a least load factor that is
       larger by more than this part.
     - ``at_least``: the search ends with the first climb that has this load factor in all stages, or
@@ -129,6 +132,13 @@ class ClimbRequest(Query, frozen=True, kw_only=True):
     )
     limits: Limits = Limits()
     objective: ObjectiveName = "max_margin"
+    wrist: Annotated[
+        Literal["fixed", "compliant"],
+        Meta(description="compliant: stages are planned with wrists that give, too"),
+    ] = "fixed"
+    wrist_travel: Annotated[
+        WristTravel | None, Meta(description="range in which a compliant wrist may settle")
+    ] = None
     best_within: Annotated[
         float,
         Meta(ge=0.0, le=10.0, description="part by which another climb may be better"),
@@ -146,6 +156,18 @@ class ClimbRequest(Query, frozen=True, kw_only=True):
         ),
     ] = []
     parts: InParts = False
+
+    def __post_init__(self) -> None:
+        if self.wrist == "compliant" and self.objective not in ("max_margin", "min_effort"):
+            raise InvalidFieldError(
+                f"'compliant' requires objective max_margin or min_effort, got {self.objective!r}",
+                field="wrist",
+            )
+        if self.wrist_travel is not None and self.wrist != "compliant":
+            raise InvalidFieldError(
+                f"requires wrist 'compliant', got {self.wrist!r}: change wrist, or leave it out",
+                field="wrist_travel",
+            )
 
 
 class CancelRequest(Request, frozen=True, kw_only=True):

@@ -11,12 +11,26 @@ import pytest
 from msgspec.structs import replace as changed
 
 from hand_models.base import InvalidInputError, Pose
-from planner import BodyGrid, MadeWall, PlaceGrid, climb_certificate, evaluate, find_climb
+from hand_models.hand import WristTravel
+from planner import (
+    BodyGrid,
+    MadeWall,
+    PlaceGrid,
+    climb_certificate,
+    deadline,
+    evaluate,
+    find_climb,
+    with_compliant_stages,
+    with_compliant_wrists,
+)
 from planner.certification import check_bound
 from planner.prepare import settle_each
 from service import requests
 from service.answering import SoughtClimb, climb_reply, climbs, route_of, seek_climb
 from service.answering.climbs import _bodies_near, _Progress
+from service.answering.questions import route_request
+from service.climbs import verdict_sentences
+from service.commands.stances import read_route
 from service.replies import KnotReply, PartReply
 from service.requests import ClimbEnd, ClimbRequest
 from tests.suite.helpers.knob_walls import ends, knob_wall
@@ -86,6 +100,54 @@ def test_the_route_of_the_reply_has_the_stages_of_the_climb() -> None:
     for stage, plan, told in zip(result.stages, result.plans, reply.stages, strict=True):
         assert (stage.phase, stage.limb) == (told.phase, told.limb)
         assert plan.status == told.status
+
+
+def test_nails_stay_fixed_where_other_wrists_give() -> None:
+    route = route_of(read_route("knobs"))
+    first, *others = route.start.hands
+    nailed = replace(first, grasp=changed(first.grasp, fingernail=True))
+    start = replace(route.start, hands=(nailed, *others))
+    given = with_compliant_wrists(replace(route, start=start), WristTravel(angle=0.1))
+    assert [hand.wrist for hand in given.start.hands] == ["fixed"] + ["compliant"] * 3
+    assert {hand.wrist_travel for hand in given.start.hands[1:]} == {WristTravel(angle=0.1)}
+    assert {move.hand.wrist for move in given.moves} == {"compliant"}
+
+
+@pytest.mark.slow
+def test_stages_are_planned_with_wrists_that_give_too() -> None:
+    told: list[tuple[int, int]] = []
+    travel = WristTravel(position=0.003)
+    found = with_compliant_stages(sought().found, travel, lambda *part: told.append(part))
+    reply = climb_reply(REQUEST, sought()._replace(found=found))
+    count = len(reply.stages)
+    assert told == [(k, count) for k in range(1, count + 1)]
+    assert found.compliant is not None
+    assert len(reply.stages_compliant) == count
+    factors = [stage.load_factor for stage in reply.stages_compliant]
+    assert reply.least_compliant == (None if None in factors else min(factors))
+    for fixed, stage, plan in zip(
+        sought().found.result.stages, found.compliant.stages, found.compliant.plans, strict=True
+    ):
+        assert {hand.wrist for hand in stage.question.stance.hands} == {"compliant"}
+        assert {hand.wrist_travel for hand in stage.question.stance.hands} == {travel}
+        # in the posture of the climb, not in one of its own
+        assert stage.question.stance.joints == fixed.question.stance.joints
+        assert plan.status != "failed", plan.reason
+        assert plan.verified
+    # the climb itself stays as it is
+    assert (reply.least, reply.bound) == (found.least, found.bound)
+    (said,) = (each for each in verdict_sentences(found, None) if "compliant" in each)
+    held = sum(stage.status == "optimal" for stage in reply.stages_compliant)
+    assert said.startswith(f"with compliant wrists {held} of {count} stages hold")
+    route = route_request(REQUEST, found.compliant.route)
+    assert {hand.wrist_travel for hand in route.stance.hands} == {travel}
+    assert departures("ClimbReply", msgspec.json.decode(msgspec.json.encode(reply))) == []
+
+
+@pytest.mark.slow
+def test_a_deadline_leaves_the_climb_without_compliant_stages() -> None:
+    with deadline.within(0.0):
+        assert with_compliant_stages(sought().found) is sought().found
 
 
 @pytest.mark.slow

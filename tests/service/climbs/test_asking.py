@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from hand_models.base import InvalidInputError
+from hand_models.hand import WristTravel
 from planner import BodyGrid, PlaceGrid
 from planner.climbs import DecidingStage, RefusedMoves
 from service.answering import seek_climb
-from service.climbs import Sought, climb_end, print_verdict
+from service.climbs import Sought, climb_end, naming_options, print_verdict
 from service.commands.stances import read_request
 from service.requests import ClimbEnd, ClimbRequest
 from service.tables import console
@@ -30,6 +31,8 @@ TEXTS = {
     "body_spacing": None,
     "stand_off": (0.6,),
     "lean": 0.0,
+    "wrist": None,
+    "wrist_travel": None,
 }
 
 
@@ -51,6 +54,29 @@ def test_a_request_has_what_the_options_say():
     assert request.refine == 2
     assert request.bodies.stand_offs == (0.6,)
     assert sought(stand_off=()).bodies.stand_offs != (0.6,)
+
+
+def test_wrists_give_where_that_is_asked_for():
+    request = sought(wrist="compliant", wrist_travel=(0.01, 0.002, 0.1))
+    assert (request.wrist, request.wrist_travel) == ("compliant", WristTravel(0.01, 0.002, 0.1))
+    assert (sought().wrist, sought().wrist_travel) == ("fixed", None)
+
+
+@pytest.mark.parametrize("travel", [(0.1, 0.0, 0.0), (0.01, float("nan"), 0.0), (0.0, 0.0, -0.1)])
+def test_a_travel_that_is_none_is_refused(travel):
+    with pytest.raises(InvalidInputError, match="must be") as caught, naming_options():
+        sought(wrist="compliant", wrist_travel=travel)
+    assert caught.value.field.startswith("--wrist-travel")
+
+
+def test_what_fixed_wrists_alone_have_is_refused():
+    with pytest.raises(InvalidInputError, match="requires wrist 'compliant'") as caught:
+        sought(wrist_travel=(0.01, 0.002, 0.1))
+    assert caught.value.field == "wrist_travel"
+    ends = {"start": ClimbEnd(height=0.0), "goal": ClimbEnd(height=1.0)}
+    with pytest.raises(InvalidInputError, match="max_margin or min_effort") as caught:
+        ClimbRequest(v=1, rock="x", wrist="compliant", objective="max_robust", **ends)
+    assert caught.value.field == "wrist"
 
 
 def test_an_end_may_be_a_bundled_stance():
@@ -134,6 +160,7 @@ def test_a_move_of_no_limb_is_told_without_one(capsys):
         bound=0.7,
         deciding=None,
         result=None,
+        compliant=None,
         raises=(),
         about="",
         refused=refused,
@@ -180,6 +207,7 @@ def test_none_and_one_read_well(moves, knots, move, said, capsys):
         ),
         deciding=deciding,
         result=SimpleNamespace(plans=[SimpleNamespace(reason="rear: the palm slips", spread=None)]),
+        compliant=None,
         raises=(),
         about="",
         refused=(),
