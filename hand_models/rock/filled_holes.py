@@ -55,14 +55,15 @@ def filled_cells(triangles: Triangles) -> list[FilledCells]:
     sides = vertices[some] - vertices[some[:, [1, 2, 0]]]
     highest = steep * float(np.median(np.linalg.norm(sides, axis=2)))
     for axis in range(3):
-        values, level, counts = np.unique(
-            vertices[:, axis], return_inverse=True, return_counts=True
-        )
         along = vertices[:, axis]
-        if counts.max() < least or np.ptp(along[faces], axis=1).max() <= highest:
+        values, counts = np.unique(along, return_counts=True)
+        if counts.max() < least:
             continue
         edges = edges_of(faces)
         cliff = np.abs(along[edges[:, 0]] - along[edges[:, 1]]) > highest
+        if not cliff.any():
+            continue
+        level = np.searchsorted(values, along)
         ends = level[edges]
         leaves = ends[:, 0] != ends[:, 1]
         ways, cliffs = (

@@ -1,9 +1,10 @@
-"""Triangulate points across the view (Delaunay), a million of them in half a second (compiled).
+"""Thin points and triangulate them across the view, a million in half a second (compiled).
 
-Points are added in the order of their distance from a centre, so that each is outside the hull of
-those before it: it is joined to the edges of the hull that it sees, and edges are flipped until no
-point lies in the circle about a triangle. Coordinates are whole numbers of so few digits that the
-side of a line on which a point lies is exact: no triangle is turned over, whatever the points.
+Triangles are those of Delaunay. Points are added in the order of their distance from a centre, so
+that each is outside the hull of those before it: it is joined to the edges of the hull that it
+sees, and edges are flipped until no point lies in the circle about a triangle. Coordinates are
+whole numbers of so few digits that the side of a line on which a point lies is exact: no triangle
+is turned over, whatever the points.
 """
 
 from __future__ import annotations
@@ -15,7 +16,57 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, compiled
 
-__all__ = ["bridged_widths", "delaunay_triangles"]
+__all__ = ["bridged_widths", "delaunay_triangles", "median_points", "vertex_normals"]
+
+
+@compiled()
+def _before(depths: Array, a: int, b: int) -> bool:
+    return bool(depths[a] < depths[b] or (depths[a] == depths[b] and a < b))
+
+
+@compiled()
+def _median(depths: Array, some: Indices, low: int, high: int) -> int:
+    """Return the median of ``some[low : high + 1]`` by depth, which are exchanged (quickselect)."""
+    middle = (low + high) // 2
+    while low < high:
+        pivot, i, j = some[(low + high) // 2], low, high
+        while i <= j:
+            while _before(depths, some[i], pivot):
+                i += 1
+            while _before(depths, pivot, some[j]):
+                j -= 1
+            if i <= j:
+                some[i], some[j] = some[j], some[i]
+                i, j = i + 1, j - 1
+        if j < middle < i:
+            break
+        low, high = (low, j) if middle <= j else (i, high)
+    return int(some[middle])
+
+
+@compiled("f1", "i1", "i1")
+def median_points(depths: Array, squares: Indices, order: Indices) -> Indices:
+    """Return the point of median depth of each square that has any, square by square.
+
+    Of two middle ones the nearer is returned, and of equal depths the first comes first.
+
+    Parameters
+    ----------
+    depths : ndarray, shape (n,)
+        Depth of each point [m].
+    squares : ndarray of int, shape (n,)
+        Number of the square in which each point is.
+    order : ndarray of int, shape (n,)
+        Indices of the points, square by square, those of a square in any order.
+    """
+    kept, found, count, begin = np.empty(len(order), dtype=np.intp), order.copy(), 0, 0
+    while begin < len(order):
+        end, square = begin + 1, squares[order[begin]]
+        while end < len(order) and squares[order[end]] == square:
+            end += 1
+        kept[count] = _median(depths, found, begin, end - 1)
+        count, begin = count + 1, end
+    return kept[:count]
 
 
 @compiled()
@@ -192,3 +243,30 @@ def bridged_widths(points: Array, corners: Indices, beside: Indices) -> tuple[Ar
             longest = math.inf
         width[i], area[i] = longest, 0.5 * twice
     return width, area
+
+
+@compiled("f2", "i2")
+def vertex_normals(points: Array, faces: Indices) -> Array:
+    """Return the unit normal of each vertex, (n, 3): the mean of its triangles' by their area.
+
+    ``points`` (n, 3) [m] and ``faces`` (m, 3): the mesh. A vertex without triangles has zeros.
+    """
+    normals, areas = np.zeros(points.shape), np.empty(faces.shape)
+    u, v = np.empty(3), np.empty(3)
+    for i in range(len(faces)):
+        a, b, c = faces[i]
+        for k in range(3):
+            u[k], v[k] = points[b, k] - points[a, k], points[c, k] - points[a, k]
+        for k in range(3):
+            m, n = (k + 1) % 3, (k + 2) % 3
+            areas[i, k] = 0.5 * (u[m] * v[n] - u[n] * v[m])
+    for corner in range(3):
+        for i in range(len(faces)):
+            for k in range(3):
+                normals[faces[i, corner], k] += areas[i, k]
+    for normal in normals:
+        square = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]
+        length = max(math.sqrt(square), 1e-300)  # divides what is zero
+        for k in range(3):
+            normal[k] /= length
+    return normals

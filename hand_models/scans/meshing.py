@@ -26,6 +26,7 @@ from hand_models.scans.scan import (
     Scan,
     Unit,
     axes_along,
+    box_about,
     in_scan,
     start_on,
 )
@@ -152,7 +153,7 @@ def triangulated(
     """
     _check_strays(scan.points)
     axes = axes_along(scan.direction())
-    middle = 0.5 * (scan.points.min(axis=0) + scan.points.max(axis=0))
+    middle = 0.5 * np.add(*box_about(scan.points))
     # along the axes, but from the scan's origin: a crop of the scan has the same squares
     points = scan.points @ axes
     _check_spread(points)
@@ -319,7 +320,8 @@ def _spacing(points: Array) -> float:
     # points at one place count once
     across = points[_kept(points, 0.0), :2]
     some = across[:: max(1, len(across) // 20_000)]  # so many or some more are enough
-    tree = scipy.spatial.cKDTree(across, compact_nodes=False, balanced_tree=False)
+    # few of them are asked for: leaves so large are sooner made
+    tree = scipy.spatial.cKDTree(across, 64, compact_nodes=False, balanced_tree=False)
     distance = np.asarray(tree.query(some, k=2)[0])
     return float(np.median(distance[:, 1]))
 
@@ -348,10 +350,9 @@ def _squares(points: Array, side: float) -> Indices:
 
 def _kept(points: Array, side: float) -> Indices:
     """Return the point of median depth of each square that has any, square by square."""
+    from hand_models.scans.compiled_triangulation import median_points
+
     square = _squares(points, side)
     # tilted by so little that only of points at one depth another comes first, whatever their order
-    order = np.argsort(points @ np.array([1e-6, 1.7e-6, 1.0]))
-    order = order[np.argsort(square[order], kind="stable")]
-    begins = np.flatnonzero(np.diff(square[order], prepend=-1))
-    ends = np.append(begins[1:], len(order))
-    return np.asarray(order[(begins + ends - 1) // 2])
+    depths = points @ np.array([1e-6, 1.7e-6, 1.0])
+    return median_points(depths, square, np.argsort(square))

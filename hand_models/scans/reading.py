@@ -15,7 +15,7 @@ from hand_models.rock import MESH_ENDINGS, read_vertices
 from hand_models.scans.columns import read_columns
 from hand_models.scans.grids import is_esri, read_esri, read_geotiff, read_numpy
 from hand_models.scans.pcd import read_pcd
-from hand_models.scans.scan import UNIT_METRES, UP_ROTATIONS, RawScan, Scan, Unit, Up
+from hand_models.scans.scan import UNIT_METRES, UP_ROTATIONS, RawScan, Scan, Unit, Up, box_about
 
 __all__ = ["SCAN_ENDINGS", "read_scan"]
 
@@ -125,7 +125,7 @@ def read_scan(
     _check_numbers(raw.points, read, path)
     scale, turn = _scale(raw.points, unit, width), UP_ROTATIONS[up]
     _check_digits(raw.points, scale, path)
-    if not np.ptp(raw.points, axis=0).any():
+    if np.equal(*box_about(raw.points)).all():
         place = ", ".join(f"{x:g}" for x in raw.points[0])
         raise InvalidInputError(
             f"all {len(raw.points):,} points of {path} are at ({place}); a scan has points at "

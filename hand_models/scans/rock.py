@@ -10,7 +10,7 @@ import numpy as np
 from hand_models.base import Array, Indices, Pose, whole_file
 from hand_models.rock import FilledCells, Triangles
 from hand_models.scans.holes import Gaps, Hole, Step
-from hand_models.scans.scan import areas_of
+from hand_models.scans.scan import box_about
 
 __all__ = ["ScannedRock", "write_rock"]
 
@@ -74,17 +74,17 @@ class ScannedRock:
     @property
     def extent(self) -> Array:
         """Size of the rock along each axis of its frame, shape (3,) [m]."""
-        return np.asarray(np.ptp(self.vertices, axis=0))
+        low, high = box_about(self.vertices)
+        return high - low
 
 
 def write_rock(rock: ScannedRock | Triangles, path: Path) -> None:
     """Write rock to a PLY file with normals [m], which `read_mesh` can read for a hold."""
+    from hand_models.scans.compiled_triangulation import vertex_normals
+
     vertices, faces = rock.vertices, rock.faces
-    # a vertex's normal is the mean of its triangles', by area
-    areas, corners = areas_of(vertices, faces), faces.T.ravel()
-    normals = np.array([np.bincount(corners, np.tile(a, 3), len(vertices)) for a in areas.T])
-    normals /= np.maximum(np.linalg.norm(normals, axis=0), np.finfo(float).tiny)
-    points = np.column_stack([vertices, normals.T]).astype("<f4")
+    normals = vertex_normals(np.ascontiguousarray(vertices), np.ascontiguousarray(faces))
+    points = np.column_stack([vertices, normals]).astype("<f4")
     triangles = np.full(len(faces), 3, [("count", "u1"), ("corners", "<i4", 3)])
     triangles["corners"] = faces
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]

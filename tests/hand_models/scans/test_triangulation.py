@@ -1,4 +1,4 @@
-"""Triangulations against Qhull's, and against what makes one a Delaunay triangulation."""
+"""Triangulations against Qhull's and against what makes one Delaunay's; medians and normals."""
 
 from __future__ import annotations
 
@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 import scipy
 
-from hand_models.scans.compiled_triangulation import delaunay_triangles
+from hand_models.scans.compiled_triangulation import (
+    delaunay_triangles,
+    median_points,
+    vertex_normals,
+)
+from hand_models.scans.scan import areas_of
 
 
 def joined(points):
@@ -51,3 +56,28 @@ def test_points_on_lines_and_circles_and_equal_ones_are_joined_without_gap_or_ov
         size[i] = np.linalg.norm(centre[i] - triangle[0])
     away = np.linalg.norm(points[None] - centre[:, None], axis=2)
     assert (away >= size[:, None] * (1.0 - 1e-9)).all()
+
+
+@pytest.mark.parametrize("depths", [1, 4, 10**9])
+def test_of_each_square_the_point_of_median_depth_is_kept_and_of_equal_ones_the_first(depths):
+    rng = np.random.default_rng(depths)
+    # squares of one to hundreds of points, in no order
+    squares = np.rint(rng.exponential(40.0, 2000)).astype(int)
+    depth = rng.integers(0, depths, 2000).astype(float)
+    order = rng.permutation(2000)
+    kept = median_points(depth, squares, order[np.argsort(squares[order], kind="stable")])
+    for square, own in zip(np.unique(squares), kept, strict=True):
+        there = np.flatnonzero(squares == square)
+        ranked = there[np.lexsort([there, depth[there]])]
+        assert own == ranked[(len(there) - 1) // 2]
+
+
+def test_a_vertex_has_the_mean_normal_of_its_triangles_by_their_area():
+    rng = np.random.default_rng(0)
+    points, faces = rng.normal(size=(40, 3)), rng.integers(0, 39, (90, 3))
+    normals, areas = vertex_normals(points, faces), areas_of(points, faces)
+    for vertex in range(39):
+        total = areas[np.nonzero(faces == vertex)[0]].sum(axis=0)
+        np.testing.assert_allclose(normals[vertex], total / np.linalg.norm(total), atol=1e-12)
+    # and none without triangles
+    assert normals[39].tolist() == [0.0, 0.0, 0.0]
