@@ -1,8 +1,7 @@
-"""Find the triangles of a mesh in a box, on a line or near a point, by a tree of boxes (compiled).
+"""Find triangles of a mesh by a tree of boxes, and the neighbours of its vertices (compiled).
 
 Triangles in the order of a space-filling curve make up leaves of equally many. Each box of a level
-holds two of the level below it, so that a search visits those boxes alone that it meets, however
-large the mesh is.
+holds two of the level below it, so that a search visits those boxes alone that it meets.
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ __all__ = [
     "distances_from",
     "leaf_boxes",
     "lines_met",
+    "neighbour_means",
     "solid_triangles",
     "triangles_in_box",
 ]
@@ -71,6 +71,54 @@ def solid_triangles(vertices: Array, faces: Indices, least: float) -> NDArray[np
             area += (edges[0, m] * edges[1, n] - edges[0, n] * edges[1, m]) ** 2
         solid[i] = area > least**2 * square.max() and square.max() > least**2
     return solid
+
+
+@compiled()
+def _neighbours(faces: Indices, count: int) -> tuple[NDArray[np.int32], Indices]:
+    """Return the neighbours of each vertex, ascending, once for each edge, and where they begin."""
+    begins = np.zeros(count + 1, dtype=np.intp)
+    begins[1:] = np.cumsum(2 * np.bincount(faces.ravel(), minlength=count))
+    beside, sorted_ = np.empty(6 * len(faces), np.int32), np.empty(6 * len(faces), np.int32)
+    ends, sorted_ends = begins[:-1].copy(), begins[:-1].copy()
+    for face in faces:
+        for k in range(3):
+            for step in (1, 2):
+                beside[ends[face[k]]] = face[(k + step) % 3]
+                ends[face[k]] += 1
+    # each is a neighbour of its neighbours, which so come in order
+    for vertex in range(count):
+        for other in beside[begins[vertex] : begins[vertex + 1]]:
+            sorted_[sorted_ends[other]] = vertex
+            sorted_ends[other] += 1
+    return sorted_, begins
+
+
+@compiled("f2", "i2")
+def neighbour_means(vertices: Array, faces: Indices) -> tuple[Array, Array]:
+    """Return the mean of each vertex's neighbours, (n, 3), and their distance from it, (n,) [m].
+
+    The distance is the root of the mean of their squares; infinite for a vertex on a border, one of
+    whose edges has one triangle only. The mesh has ``vertices`` (n, 3) [m] and ``faces`` (m, 3).
+    """
+    beside, begins = _neighbours(faces, len(vertices))
+    means, spreads = np.zeros(vertices.shape), np.empty(len(vertices))
+    for i in range(len(vertices)):
+        number, square, border, end = 0, 0.0, False, begins[i + 1]
+        for at in range(begins[i], end):
+            other = beside[at]
+            if at > begins[i] and beside[at - 1] == other:
+                continue
+            number, border = number + 1, border or at + 1 == end or beside[at + 1] != other
+            x, y, z = vertices[other, 0], vertices[other, 1], vertices[other, 2]
+            square += x * x + y * y + z * z
+            for k in range(3):
+                means[i, k] += vertices[other, k]
+        number, length = max(number, 1), 0.0
+        for k in range(3):
+            means[i, k] /= number
+            length += means[i, k] ** 2
+        spreads[i] = math.inf if border else math.sqrt(max(square / number - length, 0.0))
+    return means, spreads
 
 
 @compiled("f2", "i2", "i1")
@@ -202,8 +250,7 @@ def lines_met(
     handed = turn.sum()
     entries, sides = np.full(len(points), math.inf), np.zeros(len(points), dtype=np.intp)
     middle, corners = np.empty(2), np.empty((3, 3))
-    for line in range(len(points)):
-        p = points[line]
+    for line, p in enumerate(points):
         for k in range(2):
             middle[k] = axes[k, 0] * p[0] + axes[k, 1] * p[1] + axes[k, 2] * p[2]
         first, first_at = math.inf, -1

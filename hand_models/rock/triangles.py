@@ -188,19 +188,11 @@ def without_spikes(triangles: Triangles, ratio: float) -> Triangles:
     than ``ratio`` times their root mean square distance from that mean: a needle too steep to be
     rock at the scan's resolution. A peak of several vertices is rock.
     """
+    from hand_models.rock.compiled_cells import neighbour_means
+
     vertices, faces = triangles
-    count = len(vertices)
-    ends = edges_of(faces)
-    used = scipy.sparse.coo_matrix((np.ones(len(ends)), ends.T), shape=(count, count)).tocsr()
-    used = used + used.T
-    border = np.zeros(count, dtype=bool)
-    border[used.tocoo().row[used.tocoo().data == 1.0]] = True
-    used.data[:] = 1.0
-    number = np.maximum(np.asarray(used.sum(axis=1)).ravel(), 1.0)
-    mean = used @ vertices / number[:, None]
-    square = used @ (vertices**2).sum(axis=1) / number
-    spread = np.sqrt(np.maximum(square - (mean**2).sum(axis=1), 0.0))
-    spike = ~border & (np.linalg.norm(vertices - mean, axis=1) > ratio * spread)
+    mean, spread = neighbour_means(np.ascontiguousarray(vertices), np.ascontiguousarray(faces))
+    spike = np.linalg.norm(vertices - mean, axis=1) > ratio * spread
     return Triangles(np.where(spike[:, None], mean, vertices), faces)
 
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from hand_models.rock import Mesh, Triangles
+from hand_models.rock.compiled_cells import neighbour_means
 from hand_models.rock.triangles import TriangleCells
 from tests.suite.helpers.rocks import (
     distance,
@@ -94,3 +95,21 @@ def test_points_inside_a_boulder_are_behind_its_triangles(seed):
     points = rng.choice(hold.triangles.vertices, 300)
     points = points + rng.normal(0.0, 0.1, points.shape) * np.ptp(points, axis=0)
     assert hold.cells.distances(points, 10.0) == pytest.approx(distance(hold, points), abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_means_of_neighbours_count_each_once_and_borders_have_edges_of_one_triangle(seed):
+    """Of triangles at random, several of them at an edge, against sets of neighbours."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(4, 40))
+    faces = np.array([rng.permutation(count)[:3] for _ in range(2 * count)])
+    vertices = rng.normal(size=(count + 1, 3))
+    means, spreads = neighbour_means(vertices, faces)
+    for vertex in range(count + 1):
+        own = faces[(faces == vertex).any(axis=1)]
+        others, triangles = np.unique(own[own != vertex], return_counts=True)
+        mean = vertices[others].mean(axis=0) if len(others) else np.zeros(3)
+        np.testing.assert_allclose(means[vertex], mean, atol=1e-12)
+        spread = np.inf if 1 in triangles else math.sqrt(((vertices[others] - mean) ** 2).sum())
+        spread /= math.sqrt(max(len(others), 1))
+        assert spreads[vertex] == pytest.approx(spread, abs=1e-7)
