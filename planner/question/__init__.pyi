@@ -9,11 +9,11 @@ from .limits import (
     LimbStiffness as LimbStiffness,
     Limits as Limits,
     Objective as Objective,
-    OpenLoopSettings as OpenLoopSettings,
     Want as Want,
 )
 from .load import Load as Load, Weights as Weights
 from .lost_tile import LostTile as LostTile
+from .open_loop import OpenLoopSettings as OpenLoopSettings
 from .question import (
     MOST_DRAWS as MOST_DRAWS,
     OwnObjective as OwnObjective,

@@ -22,11 +22,11 @@ from planner.question.limits import (
     BodyRange,
     Limits,
     Objective,
-    OpenLoopSettings,
     Want,
     no_torque,
 )
 from planner.question.load import Load, Weights
+from planner.question.open_loop import OpenLoopSettings
 from planner.question.stance import Stance, checked_body_wrench, known_choice, known_limbs
 
 __all__ = ["MOST_DRAWS", "OwnObjective", "Question"]
