@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import time
+from dataclasses import replace
+
 import numpy as np
 
+from planner import deadline
 from planner.advice.body import BodySearch, can_move
 from planner.advice.changes import SETTINGS, Change
 from planner.advice.combinations import CombinationSearch
@@ -11,12 +15,12 @@ from planner.advice.hands import closings, grasps, lettings, placed, turn_motion
 from planner.advice.new_holds import try_new_holds
 from planner.advice.strength import lighter, stronger
 from planner.advice.trials import Attempt, StanceTrial, Trials, Tried
-from planner.deadline import DeadlineError
+from planner.deadline import DeadlineError, late_sentence
 from planner.programs import CAP_SLACK
 from planner.question import Question
-from planner.result import Advice
+from planner.result import Advice, Plan, Time
 
-__all__ = ["advise"]
+__all__ = ["add_advice", "advise"]
 
 
 def advise(
@@ -148,4 +152,34 @@ def _advice(trials: Trials, change: Change, trial: StanceTrial) -> Advice:
         load_factor=factor.factor,
         load_factor_status=factor.status,
         holds=holds,
+    )
+
+
+def add_advice(question: Question, answer: Plan, attempt: Attempt) -> Plan:
+    """Return a plan with advice added, or with the reason why there is none.
+
+    Parameters
+    ----------
+    question : Question
+    answer : Plan
+        The question's plan.
+    attempt : callable
+        As of `advise`.
+    """
+    start = time.perf_counter()
+    if odd := [each.field for each in answer.findings if each.doubts_number]:
+        warning = f"no search for advice while a number is in doubt: {', '.join(odd)}"
+        return replace(answer, advice=(), warnings=(*answer.warnings, warning))
+    found, whole = advise(question, attempt)
+    seconds, unfinished, warnings = deadline.seconds(), answer.unfinished, answer.warnings
+    if not whole and seconds is not None:
+        unfinished = (*unfinished, "advice")
+        warnings = (*warnings, late_sentence(seconds, ["advice"]))
+    total = answer.time.total + time.perf_counter() - start
+    return replace(
+        answer,
+        advice=found,
+        unfinished=unfinished,
+        warnings=warnings,
+        time=Time(answer.time.model, answer.time.solve, total),
     )

@@ -7,10 +7,8 @@ with tensions kept, palms and lateral reactions balance the body as far as they 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
-from msgspec import structs
 
 from hand_models.base import Array
 from hand_models.hand import FINGERS
@@ -20,23 +18,7 @@ from planner.programs import CAP_SLACK, LOAD_UNIT, Outcome
 from planner.result import LoadRecovery, SentPlan
 from planner.verification import Check
 
-__all__ = ["sent_plans", "without_margins"]
-
-
-def without_margins(prepared: PreparedStance) -> PreparedStance:
-    """Return a stance whose hard rows have no margin: a margin is for plans, not for what happens.
-
-    Parameters
-    ----------
-    prepared : PreparedStance
-    """
-    question, hands = prepared.question, prepared.hands
-    limits = structs.replace(question.limits, hold_margin=0.0, palm_margin=0.0, least_tension=0.0)
-    if limits == question.limits:
-        return prepared
-    added = tuple([replace(each, margin=0.0, palm=0.0, least=0.0) for each in hands.added])
-    bare = replace(prepared, question=replace(question, limits=limits))
-    return replace(bare, hands=replace(hands, added=added)).with_hands(prepared.batch.hands)
+__all__ = ["sent_plans"]
 
 
 def sent_plans(

@@ -20,7 +20,7 @@ from planner.prepare.joint_posture import Posture, posture
 from planner.prepare.settled_stance import settle_stance
 from planner.prepare.stance_constraints import NO_CONSTRAINTS, TOLERANCES, StanceConstraints
 from planner.programs import WRENCH_UNIT, ScaledRows
-from planner.question import Question
+from planner.question import Limits, Question
 
 __all__ = ["PreparedStance", "assemble", "checked_question", "prepare_stance"]
 
@@ -108,6 +108,16 @@ class PreparedStance:
         hands = self.hands.with_sets(spaces, wrists)
         return replace(self, batch=HandBatch.of(settled), hands=hands)
 
+    def with_margins(self, limits: Limits) -> PreparedStance:
+        """Return the same stance with limits whose margins are others, and all else is the same."""
+        limits = limits.with_share(1.0)
+        names = {"hold_margin": "margin", "palm_margin": "palm", "least_tension": "least"}
+        own = {rows: getattr(limits, name) for name, rows in names.items()}
+        added = tuple([replace(each, **own) for each in self.hands.added])
+        other = replace(self, question=replace(self.question, limits=limits))
+        other = replace(other, hands=replace(self.hands, added=added))
+        return other.with_hands(self.batch.hands)
+
 
 def checked_question(question: Question) -> Question:
     """Return a question unchanged, after a check of its type.
@@ -128,14 +138,16 @@ def prepare_stance(question: Question) -> PreparedStance:
     Returns
     -------
     PreparedStance
-        Hands closed on their holds, joint torques, wrench spaces and the body wrench.
+        Hands closed on their holds, joint torques, wrench spaces and the body wrench. Without
+        margins if these need not be kept: `PreparedStance.with_margins` adds what can be.
 
     Raises
     ------
     InvalidInputError
         If the question is not valid; the field is relative to the question.
     """
-    checked_question(question)
+    if checked_question(question).limits.margins == "if_possible":
+        question = replace(question, limits=question.limits.with_share(0.0))
     where = posture(question)
     with errors_under("load"):
         wrench = question.needed_wrench(None if where is None else where.weights)
@@ -201,7 +213,8 @@ def _added_rows(question: Question, where: Posture | None) -> tuple[StanceConstr
     """Return what joints, caps and present tensions add to the set of each hand."""
     stance, limits = question.stance, question.limits
     change = limits.tension_change
-    margins = max(limits.hold_margin, limits.least_tension, limits.palm_margin) > 0.0
+    hold = limits.hold_margin or 0.0
+    margins = max(hold, limits.least_tension, limits.palm_margin) > 0.0
     found = []
     for hand in stance.hands:
         cap, frame = limits.per_hand.get(hand.limb), None
@@ -222,7 +235,7 @@ def _added_rows(question: Question, where: Posture | None) -> tuple[StanceConstr
                 frame=frame,
                 present=question.present.get(hand.limb),
                 change=math.inf if change is None else change,
-                margin=limits.hold_margin,
+                margin=hold,
                 least=limits.least_tension,
                 palm=limits.palm_margin,
             )

@@ -10,15 +10,17 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Final, Literal, get_args
 
 from msgspec import Meta
-from msgspec.structs import force_setattr
+from msgspec.structs import force_setattr, replace
 
 from hand_models.base import Force, InvalidFieldError, Name, Strict, Tension, check_positive
+from hand_models.parameters import bundled_table
 
 __all__ = [
     "BodyRange",
     "ForceCap",
     "LimbStiffness",
     "Limits",
+    "Margins",
     "Objective",
     "Want",
     "no_torque",
@@ -31,6 +33,8 @@ Want = Literal[
 ]
 
 Frame = Literal["hand", "body", "world"]
+
+Margins = Literal["required", "if_possible"]
 
 LEAST_LIMIT: Final = 1e-3
 """Least force or torque that is valid as a limit [N, N·m]; a smaller one is a rounding error."""
@@ -165,9 +169,13 @@ class Limits(Strict, frozen=True):
         Cap on each hand's force, by limb.
     tension_change : float, optional
         Largest change of a tendon's tension from the present one [N].
-    hold_margin : float
+    margins : {'required', 'if_possible'}
+        Whether a plan must keep the three margins that follow, or the largest common share of them
+        that costs at most a tenth of the least utilisation, and no more than the cap leaves.
+    hold_margin : float, optional
         Force by which every tile on rock must stay short of being dragged backward, and every bare
-        frame must press on the rock [N].
+        frame must press on the rock [N]. By default zero, or that of ``plans.toml`` where margins
+        are kept if possible.
     palm_margin : float
         Force with which every palm of a hand with a fixed wrist must press on the rock, if it is
         engaged [N].
@@ -186,14 +194,13 @@ class Limits(Strict, frozen=True):
     tension_change: Annotated[
         Tension | None, Meta(description="largest change from the present tensions [N]")
     ] = None
+    margins: Annotated[
+        Margins, Meta(description="whether the margins must be kept, or what can be of them")
+    ] = "required"
     hold_margin: Annotated[
-        float,
-        Meta(
-            ge=0.0,
-            le=MOST_MARGIN,
-            description="by which tiles are short of being dragged backwards [N]",
-        ),
-    ] = 0.0
+        Annotated[float, Meta(ge=0.0, le=MOST_MARGIN)] | None,
+        Meta(description="by which tiles are short of being dragged backwards [N]"),
+    ] = None
     palm_margin: Annotated[
         float,
         Meta(ge=0.0, le=MOST_MARGIN, description="with which palms of fixed wrists press [N]"),
@@ -211,9 +218,14 @@ class Limits(Strict, frozen=True):
             most = getattr(self, name)
             if most is not None:
                 check_positive(most, "N", name)
+        if self.margins not in get_args(Margins):
+            raise InvalidFieldError(
+                f"must be one of {', '.join(get_args(Margins))}, got {self.margins!r}",
+                field="margins",
+            )
         for name in ("hold_margin", "palm_margin", "least_tension"):
             least = getattr(self, name)
-            if not 0.0 <= least <= MOST_MARGIN:
+            if least is not None and not 0.0 <= least <= MOST_MARGIN:
                 raise InvalidFieldError(
                     f"must be 0 to {MOST_MARGIN:g} N, got {least:g}", field=name
                 )
@@ -239,6 +251,27 @@ class Limits(Strict, frozen=True):
             idle = 0.0 if isinstance(given, tuple) else LEAST_LIMIT
             if not all(most == idle or LEAST_LIMIT <= most < math.inf for most in each):
                 raise no_torque(each, "joint_torque" + (f".{limb}" if limb else ""))
+
+    @property
+    def asked_margins(self) -> Mapping[str, float]:
+        """Margins by name, with the default of ``hold_margin`` [N]; only those above zero."""
+        hold = self.hold_margin
+        if hold is None and self.margins == "if_possible":
+            hold = bundled_table("plans.toml", "planner.parameters").positive(
+                "margins", "hold_margin"
+            )
+        each = {
+            "hold_margin": hold or 0.0,
+            "palm_margin": self.palm_margin,
+            "least_tension": self.least_tension,
+        }
+        return {name: least for name, least in each.items() if least}
+
+    def with_share(self, share: float) -> Limits:
+        """Return the limits with a share of each margin, from 0 (without) to 1."""
+        none = {"hold_margin": 0.0, "palm_margin": 0.0, "least_tension": 0.0}
+        own = {name: share * least for name, least in self.asked_margins.items()}
+        return replace(self, **{**none, **own})
 
 
 def no_torque(given: Sequence[float], field: str) -> InvalidFieldError:

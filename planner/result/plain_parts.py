@@ -217,6 +217,7 @@ class Finding(Struct, frozen=True):
         ``palm_away``, ``fingers_down``, ``body_in_rock``, ``body_reversed``, ``hands_overlap``,
         ``hand_in_body``, ``limbs_crossed``, ``out_of_reach``, ``gravity_up``, ``unit``,
         ``wrench_not_up``, ``nearly_pinching``, ``hand_adds_nothing``, ``margin_not_had``,
+        ``margin_reduced``,
         ``palm_without_travel``, ``tile_stretched_far`` or, if joints are known, ``link_in_rock``,
         ``links_collide``, ``mass_below_limbs`` and ``com_off_posture``.
     field : str
@@ -225,8 +226,8 @@ class Finding(Struct, frozen=True):
         What is odd, and the mistake that is its likely cause.
     value : float
         Measured value: a depth, a distance, a share of the reach, a cosine, an angle, the travel
-        that a palm lacks, the stretch of a tile, or the utilisation without the hand; or the number
-        that seems to have a wrong unit.
+        that a palm lacks, the stretch of a tile, the share of the margins that is kept, or the
+        utilisation without the hand; or the number that seems to have a wrong unit.
     unit : str
         Unit of ``value``, such as ``m``, ``m/s²`` or ``1``.
     """

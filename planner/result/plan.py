@@ -118,6 +118,9 @@ class Plan:
         Utilisation and load factor over Monte Carlo samples of parameters, if asked for.
     clearance : Clearance or None
         Least distances between hands, links, body and rock, if asked for.
+    margin_share : float or None
+        Share of the margins that the plan keeps, from 0 to 1, if it is to keep them if possible;
+        None without a plan.
     advice : tuple of Advice or None
         Changes that would make the stance feasible or lower its utilisation, if asked for. First
         the changes that make it feasible, the smallest first; then those with most gain for their
@@ -154,6 +157,7 @@ class Plan:
     clearance: Clearance | None = None
     advice: tuple[Advice, ...] | None = None
     load_factor_status: LoadFactorStatus = "not_asked"
+    margin_share: float | None = None
 
     @property
     def joint_shares(self) -> Mapping[str, Array] | None:

@@ -47,6 +47,12 @@ def refuse(route: Route) -> None:
             "is not available in a climb, whose loads are those at rest; leave it out",
             field="load.angular_acceleration",
         )
+    if route.limits.margins != "required":
+        raise UnsupportedError(
+            f"{route.limits.margins} is not available in a climb, whose knots must all keep the "
+            "same margins; valid is required: leave it out, and give the margins",
+            field="limits.margins",
+        )
     if route.limits.palm_margin:
         raise UnsupportedError(
             "is not available in a climb, in which the palm of a hand that leaves comes off its "

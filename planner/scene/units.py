@@ -224,7 +224,7 @@ def _tensions(question: Question) -> Iterator[Finding]:
         message = f"{cap:.3g} N is next to nothing of the {most:.4g} N that a tendon holds"
         yield unit_finding("limits.tendon_tension", f"{message}: is it in N?", cap, "N")
     for name in ("hold_margin", "palm_margin", "least_tension"):
-        least = getattr(question.limits, name)
+        least = getattr(question.limits, name) or 0.0
         if 0.0 < least < SCENE_SETTINGS.in_thousands * closing:
             message = f"{least:.3g} N is next to nothing of the {closing:.3g} N that tendons close"
             yield unit_finding(

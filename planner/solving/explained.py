@@ -15,7 +15,7 @@ from hand_models.hand import FINGERS
 from planner import deadline
 from planner.advice import Attempt
 from planner.deadline import DeadlineError, Unfinished, late, late_sentence
-from planner.execution import find_open_loop, without_margins
+from planner.execution import KeptMargins, find_open_loop, margin_not_had, without_margins
 from planner.explanation import (
     ActiveLimits,
     LimitUse,
@@ -66,6 +66,7 @@ def explained_plan(
     factor: LoadFactor,
     attempt: Attempt,
     moments: tuple[float, float, float],
+    kept: KeptMargins | None = None,
 ) -> Plan:
     """Compose the reported plan, with its explanation and the extras that the question wants.
 
@@ -84,6 +85,9 @@ def explained_plan(
     moments : tuple of (float, float, float)
         Times at which the answer was begun, prepared and solved, on the clock of
         `time.perf_counter` [s].
+    kept : KeptMargins, optional
+        What of the margins the answer keeps, if it need not keep all. The extras then are those of
+        the stance without margins, which other loads, hands and rock may leave no room.
     """
     question, where, solution = prepared.question, prepared.where, answer.solution
     start, prepared_at, solved = moments
@@ -103,11 +107,15 @@ def explained_plan(
         )
     else:
         parts = _of_none(prepared, answer)
-    odd = (*odd, *_margin_findings(prepared, checks, answer, attempt))
+    if kept is None:
+        free, odd = prepared, (*odd, *_margin_findings(prepared, checks, answer, attempt))
+    else:
+        free, parts["margin_share"] = without_margins(prepared), kept.share
+        odd = (*odd, *kept.findings(question.limits.utilisation))
     if "robust" in question.want and prepared.needs_hands:
         # last: these take the longest
         parts["robust"] = find_robust_load_factor(
-            prepared, checks.idle, solution, attempt, overloaded=checks.overloaded
+            free, checks.idle, solution, attempt, overloaded=checks.overloaded
         )
         unfinished += late("robust") if parts["robust"] is None else ()
     if "open_loop" in question.want and isinstance(answer, Verified):
@@ -117,7 +125,7 @@ def explained_plan(
     if "spread" in question.want:
         hands = answer.by_hand() if isinstance(answer, Verified) else ()
         passes = partial(execution_passes, prepared)
-        parts["spread"] = find_spread(prepared, checks.idle, solution, attempt, hands, passes)
+        parts["spread"] = find_spread(free, checks.idle, solution, attempt, hands, passes)
         unfinished += late("spread") if parts["spread"] is None else ()
     if "clearance" in question.want:
         parts["clearance"] = _clearance(prepared)
@@ -295,8 +303,7 @@ def _margin_findings(
 ) -> Iterator[Finding]:
     """Yield at most one finding: that there is a plan within the cap without the margins."""
     question = prepared.question
-    names = ("hold_margin", "palm_margin", "least_tension")
-    asked = {name: value for name in names if (value := getattr(question.limits, name))}
+    asked = question.limits.asked_margins
     # idle limbs do not depend on margins
     missed = answer.whole > question.limits.utilisation + CAP_SLACK and not checks.overloaded
     if not (asked and missed and question.explain) or deadline.expired():
@@ -308,13 +315,7 @@ def _margin_findings(
         return
     if used > question.limits.utilisation + CAP_SLACK:
         return
-    said = " and ".join(f"{name} of {value:g} N" for name, value in asked.items())
-    cap = question.limits.utilisation
-    message = (
-        f"with a {said} there is no plan within the utilisation of {cap:g}; without, it is "
-        f"{used:.4g}: lower the margin, or go without"
-    )
-    yield Finding("margin_not_had", f"limits.{next(iter(asked))}", message, used, "1")
+    yield margin_not_had(asked, question.limits.utilisation, used)
 
 
 def _clearance(prepared: PreparedStance) -> Clearance:

@@ -11,14 +11,15 @@ import numpy as np
 
 from hand_models.base import Array
 from planner import deadline, programs
-from planner.advice import StanceTrial, advise
-from planner.deadline import Budget, late_sentence
+from planner.advice import StanceTrial, add_advice
+from planner.deadline import Budget
+from planner.execution import KeptMargins, kept_margins
 from planner.explanation import LimitUse, certify
 from planner.floating import SETTINGS
 from planner.prepare import PreparedStance, checked_question, prepare_stance
-from planner.programs import CAP_SLACK, LOAD_UNIT
-from planner.question import Question
-from planner.result import Finding, LoadFactor, Plan, Time
+from planner.programs import CAP_SLACK
+from planner.question import Limits, Question
+from planner.result import Finding, LoadFactor, Plan
 from planner.solving.explained import explained_plan, reason_beyond, unexplained
 from planner.solving.fixed_wrists import FixedSolution, fixed_solutions, nearest_solutions
 from planner.solving.floating_wrists import (
@@ -36,7 +37,7 @@ from planner.solving.solution import (
     Verified,
     load_factor_of,
 )
-from planner.solving.verified import Checks, prepare_checks, recover, verify
+from planner.solving.verified import Checks, beyond_all_loads, prepare_checks, recover, verify
 
 __all__ = [
     "KnownStance",
@@ -70,7 +71,7 @@ def plan(question: Question) -> Plan:
     """
     start = time.perf_counter()
     with deadline.within(checked_question(question).deadline, started=start):
-        answer = answer_on(prepare_stance(question), start).plan()
+        answer = _with_margins(prepare_stance(question), question.limits, start).plan()
         return with_advice(question, answer) if "advice" in question.want else answer
 
 
@@ -87,6 +88,8 @@ class StanceAnswer(NamedTuple):
         Number of programs that may still be solved.
     moments : tuple of (float, float)
         Times at which the answer was begun and prepared, on the clock of `time.perf_counter` [s].
+    kept, free : KeptMargins and StanceAnswer, or None
+        What of the margins the answer keeps, if it need not keep all; the answer without any.
     """
 
     prepared: PreparedStance
@@ -94,6 +97,8 @@ class StanceAnswer(NamedTuple):
     answer: Answer
     budget: Budget
     moments: tuple[float, float]
+    kept: KeptMargins | None = None
+    free: StanceAnswer | None = None
 
     @property
     def optimal(self) -> bool:
@@ -107,17 +112,17 @@ class StanceAnswer(NamedTuple):
 
     def plan(self) -> Plan:
         """Return the plan, with its explanation and the extras that the question wants."""
-        prepared, checks, answer, budget, moments = self
-        factor = LoadFactor()
+        prepared, checks, answer, budget, moments, kept, _ = self
+        factor, free = LoadFactor(), self.free or self
         if "load_factor" in prepared.question.want:
             factor, solution = load_factor_of(
-                prepared, answer, budget, overloaded=checks.overloaded
+                free.prepared, free.answer, budget, overloaded=checks.overloaded
             )
-            if solution is not answer.solution:
+            if free is self and solution is not answer.solution:
                 better = _first_verified(prepared, checks, [solution])
                 answer = better if better.utilisation < answer.utilisation else answer
         solved = *moments, time.perf_counter()
-        return explained_plan(prepared, checks, answer, factor, try_stance, solved)
+        return explained_plan(prepared, checks, answer, factor, try_stance, solved, kept)
 
 
 def answer_on(
@@ -159,6 +164,25 @@ def answer_on(
     if isinstance(answer, Failed):
         deadline.check("a plan was found or proven infeasible")
     return StanceAnswer(prepared, checks, answer, budget, (start, modelled))
+
+
+def _with_margins(prepared: PreparedStance, asked: Limits, start: float) -> StanceAnswer:
+    """Answer with the margins that are asked for, or with what can be kept of them."""
+    if asked.margins == "required":
+        return answer_on(prepared, start)
+    found = answer_on(replace(prepared, question=prepared.question.bare()), start)
+    free, known = found.answer, prepare_checks(prepared.with_margins(asked))
+    if not isinstance(free, Verified):
+        return found._replace(prepared=prepared)
+
+    def answered(share: float) -> tuple[float, StanceAnswer]:
+        there = prepared.with_margins(asked.with_share(share))
+        near = free.solution if prepared.hands.floating and share < 1.0 else None
+        each = answer_on(there, start, known.on(there), near, prove=near is None)
+        return each.answer.utilisation, each
+
+    kept, best = kept_margins(prepared, asked, free.solution.least.value, answered)
+    return best._replace(moments=found.moments, kept=kept, free=found)
 
 
 def _solutions(
@@ -209,17 +233,6 @@ def _next_verified(
     return answer if isinstance(answer, Verified) and answer.whole <= within else None
 
 
-def _beyond_all_loads(prepared: PreparedStance, found: Answer) -> bool:
-    """Return whether loads of a plan of fixed wrists exceed `programs.load_box`.
-
-    With such loads the body is balanced where the hard rows nearly contradict the balance.
-    """
-    if prepared.hands.floating or found.utilisation <= 1.0:
-        return False
-    most = max(np.abs(loads).max(initial=0.0) for loads in found.solution.least.loads)
-    return bool(most > programs.load_box(prepared.hands.wrench) * LOAD_UNIT)
-
-
 def _second_look(
     prepared: PreparedStance, checks: Checks, found: Answer, budget: Budget, *, prove: bool
 ) -> Answer:
@@ -228,7 +241,7 @@ def _second_look(
     Of what does not pass its checks, if a proof is wanted; and of loads beyond `load_box`.
     """
     if not isinstance(found, Failed):
-        if not _beyond_all_loads(prepared, found):
+        if not beyond_all_loads(prepared, found):
             return found
         prove = True
     solution = found.solution
@@ -318,6 +331,7 @@ class KnownStance:
         self.prepared = prepared = prepare_stance(question)
         self._checks: Checks | None = None
         self._near: Solution | None = None
+        self._asked = question.limits
         # what joints bear changes with the wrench
         if prepared.where is None and question.stance.joints is None:
             self._checks = prepare_checks(prepared)
@@ -357,6 +371,8 @@ class KnownStance:
             Time at which the answer was begun, on the clock of `time.perf_counter` [s].
         """
         near, prepared = self._near, self.prepared.turned(body_wrench)
+        if self._asked.margins != "required":
+            return _with_margins(prepared, self._asked, start)
         found = answer_on(prepared, start, self._checks, near)
         if isinstance(near, FloatingSolution) and not found.optimal:
             # the search from the wrists of another wrench is local
@@ -372,8 +388,8 @@ class KnownStance:
 def with_advice(question: Question, answer: Plan) -> Plan:
     """Return a plan with advice added: changes of the question that would help.
 
-    If the deadline cuts the search off, ``advice`` is added to the unfinished results, with a
-    warning. No advice is searched for while a finding doubts a number, which a warning names.
+    If the deadline cuts the search off, ``advice`` is unfinished; while a finding doubts a number,
+    there is no search. A warning says so.
 
     Parameters
     ----------
@@ -381,20 +397,4 @@ def with_advice(question: Question, answer: Plan) -> Plan:
     answer : Plan
         The question's plan.
     """
-    start = time.perf_counter()
-    if odd := [each.field for each in answer.findings if each.doubts_number]:
-        warning = f"no search for advice while a number is in doubt: {', '.join(odd)}"
-        return replace(answer, advice=(), warnings=(*answer.warnings, warning))
-    found, whole = advise(question, try_stance)
-    seconds, unfinished, warnings = deadline.seconds(), answer.unfinished, answer.warnings
-    if not whole and seconds is not None:
-        unfinished = (*unfinished, "advice")
-        warnings = (*warnings, late_sentence(seconds, ["advice"]))
-    total = answer.time.total + time.perf_counter() - start
-    return replace(
-        answer,
-        advice=found,
-        unfinished=unfinished,
-        warnings=warnings,
-        time=Time(answer.time.model, answer.time.solve, total),
-    )
+    return add_advice(question, answer, try_stance)

@@ -13,7 +13,7 @@ from hand_models.hand import SettledHand
 from planner import programs
 from planner.explanation import LimitUse, joint_name, oddities
 from planner.prepare import HandBatch, PreparedStance
-from planner.programs import CAP_SLACK, is_least
+from planner.programs import CAP_SLACK, LOAD_UNIT, is_least
 from planner.question import LostTile
 from planner.result import (
     Finding,
@@ -24,11 +24,12 @@ from planner.result import (
     recover_floating_hand,
 )
 from planner.solving.objective import CappedObjective
-from planner.solving.solution import ByHand, Failed, Solution, Verified
+from planner.solving.solution import Answer, ByHand, Failed, Solution, Verified
 from planner.verification import Check, execution_problems
 
 __all__ = [
     "Checks",
+    "beyond_all_loads",
     "execution_passes",
     "idle_joints",
     "prepare_checks",
@@ -90,6 +91,11 @@ class Checks(NamedTuple):
         fixed = None if hands.floating else LoadRecovery(batch, hands.spaces, hands.scaled)
         used = idle_joints(prepared) if idle is None else tuple(idle)
         return cls(Check(prepared.question, batch, prepared.where), fixed, used)
+
+    def on(self, prepared: PreparedStance) -> Checks:
+        """Return recovery and checks of the same stance with other margins, and the findings."""
+        found = Checks.of(prepared, self.idle)
+        return found._replace(findings=self.findings, oddities=self.oddities)
 
     def after_slips(self, prepared: PreparedStance, lost: Sequence[LostTile]) -> Checks:
         """Return recovery and checks of the same stance, whose wrists are fixed, after slips.
@@ -199,6 +205,24 @@ def verify(prepared: PreparedStance, checks: Checks, recovered: Verified) -> Ver
     if not wrong:
         return recovered
     return Failed(solution, f"the solver's plan does not pass the checks: {wrong[0]}")
+
+
+def beyond_all_loads(prepared: PreparedStance, found: Answer) -> bool:
+    """Return whether loads of a plan of fixed wrists exceed `programs.load_box`.
+
+    With such loads the body is balanced where the hard rows nearly contradict the balance.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
+    found : Answer
+        Verified loads, a proof of infeasibility, or a failure.
+    """
+    if prepared.hands.floating or found.utilisation <= 1.0:
+        return False
+    most = max(np.abs(loads).max(initial=0.0) for loads in found.solution.least.loads)
+    return bool(most > programs.load_box(prepared.hands.wrench) * LOAD_UNIT)
 
 
 def execution_passes(

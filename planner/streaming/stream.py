@@ -212,6 +212,12 @@ def _refuse(question: Question) -> None:
             f"{objective.name} is not available for streams; valid is {MaxMargin.name}",
             field="objective",
         )
+    if question.limits.margins != "required":
+        raise UnsupportedError(
+            f"{question.limits.margins} is not available for streams, which have no time to find "
+            "what can be kept; valid is required: leave it out, and give the margins",
+            field="limits.margins",
+        )
     if question.limits.tension_change is not None:
         raise UnsupportedError(
             "not available for streams, whose tensions change with the wrench: leave it out",

@@ -263,7 +263,8 @@ class AskedLimits(ResidualLimits):
             if place.limb in present and limits.tension_change is not None
         }
         self._most = limits.tension_change or 0.0
-        self._tiles, self._margin, self._least = tiles, limits.hold_margin, limits.least_tension
+        self._tiles, self._least = tiles, limits.least_tension
+        self._margin = limits.hold_margin or 0.0
         self._hand = np.arange(len(hands)).repeat(FINGER_COUNT)
         self._palm_margin = limits.palm_margin
         self._palms = np.array(

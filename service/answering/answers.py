@@ -157,6 +157,7 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         spread=answer.spread or UNSET,
         clearance=answer.clearance or UNSET,
         reliability=answer.reliability or UNSET,
+        margin_share=UNSET if answer.margin_share is None else answer.margin_share,
         advice=UNSET if answer.advice is None else list(answer.advice),
     )
 
@@ -219,6 +220,7 @@ def brief_plan_reply(
         hands=points,
         verified=bool(answer.verified),
         unfinished=list(answer.unfinished),
+        margin_share=UNSET if answer.margin_share is None else answer.margin_share,
     )
     if hands:
         reply.body_wrench = answer.body_wrench.tolist()

@@ -119,6 +119,8 @@ class PlanReply(StanceReply, kw_only=True):
       ``not_finished`` by the deadline.
     - ``survival_probability``: probability that no tile and no palm slips, with factors of holds
       and rock: ``survival.no_slip``; null where it was not asked for, or without a plan.
+    - ``margin_share``: share of the margins that the plan keeps, from 0 to 1; only with
+      ``limits.margins`` ``if_possible``, and with a plan.
     - ``limiting``: the limit that is used most; null without a plan.
     - ``hands``: one entry for each hand; null where nothing balances the body.
     - ``joints``: joint angles planned for, by limb, from the body outward [rad]; [m] for joints
@@ -200,6 +202,7 @@ class PlanReply(StanceReply, kw_only=True):
     redundancy: Redundancy | UnsetType = UNSET
     reliability: Reliability | UnsetType = UNSET
     com_region: ComRegionReply | UnsetType = UNSET
+    margin_share: float | UnsetType = UNSET
     advice: list[Advice] | UnsetType = UNSET
 
 
@@ -246,6 +249,8 @@ class BriefPlanReply(StanceReply, kw_only=True):
     - ``utilisation``: load over capacity of the limit that is used most; null without a plan.
     - ``limiting``: the limit that is used most; null without a plan.
     - ``hands``: set-points of each hand; null where nothing balances the body.
+    - ``margin_share``: share of the margins that the plan keeps, from 0 to 1; only with
+      ``limits.margins`` ``if_possible``, and with a plan.
     - ``verified``: true where the independent check of the answer passed.
     - ``unfinished``: what a deadline has left out, by name.
     - ``body_wrench``: wrench that the rock must exert on the robot, in B [N, N·m].
@@ -268,6 +273,7 @@ class BriefPlanReply(StanceReply, kw_only=True):
     hands: list[HandSetPoints] | None = None
     verified: bool
     unfinished: list[str] = []
+    margin_share: float | UnsetType = UNSET
     body_wrench: Vector | UnsetType = UNSET
     load_factor: float | UnsetType | None = UNSET
     load_factor_unbounded: bool | UnsetType = UNSET

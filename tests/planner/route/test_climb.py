@@ -383,6 +383,9 @@ def test_what_a_climb_cannot_have_is_refused(route):
     with pytest.raises(UnsupportedError, match="comes off its rock") as raised:
         plan_climb(replace(route, limits=Limits(palm_margin=2.0)))
     assert raised.value.field == "limits.palm_margin"
+    with pytest.raises(UnsupportedError, match="knots") as raised:
+        plan_climb(replace(route, limits=Limits(margins="if_possible")))
+    assert raised.value.field == "limits.margins"
     (move,) = route.moves
     given = replace(move, joints={"rear_left": np.zeros(7)})
     solved = replace(route.start, joints="solve")

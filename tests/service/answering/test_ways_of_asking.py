@@ -152,6 +152,7 @@ VARIANTS: dict[str, list[dict[str, Any]]] = {
         {"limits.tension_change": 30.0, "present": {RIGHT: [60.0, 80.0, 80.0, 60.0]}}
     ],
     "Limits.hold_margin": [{"limits.hold_margin": 4.0}],
+    "Limits.margins": [{"limits.margins": "if_possible"}],
     "Limits.palm_margin": [{"limits.palm_margin": 60.0}],
     "Limits.least_tension": [{"limits.least_tension": 35.0}],
     "ForceCap.largest_force": [
