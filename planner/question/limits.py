@@ -13,7 +13,6 @@ from msgspec import Meta
 from msgspec.structs import force_setattr, replace
 
 from hand_models.base import Force, InvalidFieldError, Name, Strict, Tension, check_positive
-from hand_models.parameters import bundled_table
 
 __all__ = [
     "BodyRange",
@@ -257,6 +256,8 @@ class Limits(Strict, frozen=True):
         """Margins by name, with the default of ``hold_margin`` [N]; only those above zero."""
         hold = self.hold_margin
         if hold is None and self.margins == "if_possible":
+            from hand_models.parameters import bundled_table  # NumPy, which messages do not need
+
             hold = bundled_table("plans.toml", "planner.parameters").positive(
                 "margins", "hold_margin"
             )
