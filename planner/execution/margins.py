@@ -137,7 +137,7 @@ def kept_margins(
     least : float
         Least utilisation of the stance without margins.
     answered : callable
-        Returns utilisation and answer for a share; without a plan the utilisation is infinite.
+        Returns the least utilisation with a share, infinite without a plan, and the answer.
 
     Raises
     ------
@@ -164,7 +164,8 @@ def kept_margins(
                 scipy.optimize.brentq(beyond, 0.0, 1.0, xtol=MARGIN_SETTINGS.accuracy)
         else:
             share = _share_of_fixed(free, asked, budget)
-            if beyond(share) > CAP_SLACK and beyond(share - MARGIN_SETTINGS.accuracy) > CAP_SLACK:
+            less = max(share - MARGIN_SETTINGS.accuracy, 0.0)
+            if beyond(share) > CAP_SLACK and beyond(less) > CAP_SLACK:
                 beyond(0.0)
     except DeadlineError:
         if not kept:

@@ -179,7 +179,8 @@ def _with_margins(prepared: PreparedStance, asked: Limits, start: float) -> Stan
         there = prepared.with_margins(asked.with_share(share))
         near = free.solution if prepared.hands.floating and share < 1.0 else None
         each = answer_on(there, start, known.on(there), near, prove=near is None)
-        return each.answer.utilisation, each
+        held = isinstance(each.answer, Verified)
+        return each.answer.solution.least.value if held else np.inf, each
 
     kept, best = kept_margins(prepared, asked, free.solution.least.value, answered)
     return best._replace(moments=found.moments, kept=kept, free=found)
@@ -388,8 +389,7 @@ class KnownStance:
 def with_advice(question: Question, answer: Plan) -> Plan:
     """Return a plan with advice added: changes of the question that would help.
 
-    If the deadline cuts the search off, ``advice`` is unfinished; while a finding doubts a number,
-    there is no search. A warning says so.
+    There is no search while a finding doubts a number; a warning says so, or that it was cut off.
 
     Parameters
     ----------

@@ -149,9 +149,11 @@ def test_what_other_loads_hands_and_rock_do_is_told_without_margins() -> None:
     assert kept.spread.kept.without <= 0.5 * bare.spread.kept.without
 
 
-def test_effort_and_margins_are_kept_together() -> None:
-    bare = asked("wall-300", margins="if_possible", hold_margin=5.0)
-    answer = plan(replace(bare, objective="min_effort"))
+@pytest.mark.parametrize("name", ["wall-300", "slab"])
+@pytest.mark.parametrize("objective", ["min_effort", "max_reliability"])
+def test_what_is_kept_does_not_depend_on_the_objective(name: str, objective: str) -> None:
+    bare = asked(name, margins="if_possible", hold_margin=5.0)
+    answer = plan(replace(bare, objective=objective))
     assert answer.status == "optimal"
     assert answer.margin_share == pytest.approx(plan(bare).margin_share, abs=1e-6)
 
