@@ -1,4 +1,4 @@
-from .finding import ClimbProgress as ClimbProgress, find_climb as find_climb
+from .finding import find_climb as find_climb
 from .found_climb import (
     FoundClimb as FoundClimb,
     weakest_state as weakest_state,
@@ -8,6 +8,7 @@ from .found_climb import (
 from .move_checks import MoveChecks as MoveChecks
 from .other_bodies import detours as detours
 from .outcome import (
+    ClimbProgress as ClimbProgress,
     ClimbStatus as ClimbStatus,
     DecidingStage as DecidingStage,
     Raise as Raise,

@@ -15,7 +15,7 @@ from planner import deadline
 from planner.climbs.found_climb import FoundClimb, deciding_stage, with_joints
 from planner.climbs.move_checks import MoveChecks
 from planner.climbs.other_bodies import detours
-from planner.climbs.outcome import ClimbStatus, Raise, RefusedMoves
+from planner.climbs.outcome import ClimbProgress, ClimbStatus, Raise, RefusedMoves
 from planner.climbs.postures import PostureChoice, Postures, Swung
 from planner.climbs.raising import raises
 from planner.climbs.routing import ClimbStep, RouteMaker
@@ -34,29 +34,7 @@ from planner.route import (
 )
 from planner.search import Arc, Ends, Found, SearchMemory, State, Wall, search
 
-__all__ = ["ClimbProgress", "find_climb"]
-
-
-class ClimbProgress(NamedTuple):
-    """Progress of the search for a climb.
-
-    Attributes
-    ----------
-    phase : {'search', 'steps', 'moves', 'stages', 'changes'}
-    best, bound : float or None
-        Least load factor of the best climb so far, and the bound of all.
-    seconds : float
-        Since the beginning [s].
-    done, total : int
-        Moves that are planned, and their number; zero in other phases.
-    """
-
-    phase: str
-    best: float | None
-    bound: float | None
-    seconds: float
-    done: int = 0
-    total: int = 0
+__all__ = ["find_climb"]
 
 
 def find_climb(
@@ -95,7 +73,8 @@ def find_climb(
     at_least : float, optional
         Least load factor that is enough.
     seconds : float, optional
-        Time after which the best so far is returned [s]; without limit by default.
+        Time after which the best so far is returned [s]: until then, better climbs are looked for
+        where joints decide. Without it, the search ends with the best by its statics.
     settings : ClimbSettings, optional
         Rates of the controller.
     progress : callable, optional
@@ -117,7 +96,7 @@ def find_climb(
             )
     finder = _Finder(RouteMaker(wall, name, limits or Limits(), objective), settings, progress)
     with deadline.within(seconds):
-        return finder.find(start, goal, within, at_least)
+        return finder.find(start, goal, within, at_least, higher=seconds is not None)
 
 
 class _Planned(NamedTuple):
@@ -171,21 +150,61 @@ class _Finder:
         self._checks = MoveChecks(maker.wall, maker.limits)
         self._postures = Postures(self._checks)
 
-    def find(self, start: Ends, goal: Ends, within: float, at_least: float | None) -> FoundClimb:
+    def find(
+        self, start: Ends, goal: Ends, within: float, at_least: float | None, *, higher: bool
+    ) -> FoundClimb:
         """Search and plan until the climb is good enough, nothing is left, or the time is over."""
         # the first search bounds all climbs; in the next one moves are planned as climbs are found
         found = self._search(start, goal, within, at_least, 0.3)
-        if found.states and not deadline.expired() and None in (start.members, goal.members):
+        open_ends = None in (start.members, goal.members)
+        steps = open_ends and bool(found.states or not found.finished)
+        if steps and not deadline.expired():
             # from one stance to another there are few climbs, and the search finds the best
             self._step((start, goal), max(self._floor, at_least or 0.0))
-        done = self._best is not None and self._good(within, at_least)
-        if found.states and not done and not deadline.expired():
-            self._asks = True
-            found = self._search(start, goal, within, at_least, 1.0)
+        self._asks = True
+        for share in (0.5, 1.0):
+            none = found.finished and not found.states
+            if none or self._best is not None or deadline.expired():
+                break
+            found = self._search(start, goal, within, at_least, share)
+        if higher:
+            found = self._climb_higher(found, (start, goal), within, at_least)
         return self._answer(found, within, at_least)
 
+    def _climb_higher(
+        self, found: Found, ends: tuple[Ends, Ends], within: float, at_least: float | None
+    ) -> Found:
+        """Look for climbs better than the best, in whose states joints bear as much as hands hold.
+
+        The best of a search is so by its statics, which know no joints. Multiples are tried between
+        the best climb's load factor and the bound of all, as long as there is time: it may be long.
+
+        Returns the answer of the search that has found the best climb.
+        """
+        high, checks = self._bound, self._checks
+        while self._best is not None and deadline.left() and not self._good(within, at_least):
+            least = self._best.least
+            multiple = max((least * high) ** 0.5, at_least or 0.0)
+            if high <= (1.0 + within) * least or multiple >= high:
+                break
+            self._checks = checks.bearing(multiple)
+            self._postures = Postures(self._checks)
+            again = self._search(*ends, 0.0, multiple, 0.3, multiple)
+            if self._best.least > least:
+                found = again
+            elif not again.finished:
+                self._step(ends, multiple)
+            high = high if self._best.least >= multiple else multiple
+        return found
+
     def _search(
-        self, start: Ends, goal: Ends, within: float, at_least: float | None, share: float
+        self,
+        start: Ends,
+        goal: Ends,
+        within: float,
+        at_least: float | None,
+        share: float,
+        floor: float | None = None,
     ) -> Found:
         begun, left = time.perf_counter(), deadline.left()
         try:
@@ -195,7 +214,7 @@ class _Finder:
                 goal,
                 within=within,
                 at_least=at_least,
-                floor=self._floor,
+                floor=self._floor if floor is None else floor,
                 seconds=None if left is None else share * left,
                 passes=self._checks.passes if self._asks else None,
                 refuses=self._refuses if self._asks else None,
@@ -203,7 +222,7 @@ class _Finder:
                 progress=lambda _, __, bound, ___: self._report("search", bound),
             )
         except DeadlineError:
-            found = _nothing()
+            found = Found.nothing()
         self._bound = min(self._bound, found.bound)
         self._seconds["search"] += time.perf_counter() - begun
         return found
@@ -377,18 +396,3 @@ class _Finder:
             seconds = time.perf_counter() - self._begun
             known = lowest if np.isfinite(lowest) else None
             self._progress(ClimbProgress(phase, best, known, seconds, done, total))
-
-
-def _nothing() -> Found:
-    """Return the answer of a search that was broken off before it had one."""
-    return Found(
-        states=(),
-        factors=np.zeros(0),
-        least=-np.inf,
-        bound=np.inf,
-        proof=None,
-        programs=0,
-        lifts=0,
-        seconds=0.0,
-        finished=False,
-    )

@@ -50,7 +50,7 @@ class JointLoadPrograms:
     def __init__(self, wall: Wall, limits: Limits) -> None:
         self._wall = wall
         first = wall.places[0]
-        stance = Stance((first,), wall.bodies[0], robot=wall.robot)
+        stance = Stance((first,), wall.bodies[0], robot=wall.robot, joints="solve")
         self._limits = torque_limits(Question(stance, limits=limits))
         self._chains = [LimbChain.of(wall.robot, name) for name in wall.robot.limbs]
 
@@ -84,7 +84,11 @@ class JointLoadPrograms:
         return np.asarray(np.cross(arm, -np.array(EARTH_GRAVITY)) / WRENCH_UNIT[3:])
 
     def share(
-        self, state: State, loads: Mapping[int, LimbLoads], more: Array | None = None
+        self,
+        state: State,
+        loads: Mapping[int, LimbLoads],
+        more: Array | None = None,
+        multiple: float = 1.0,
     ) -> float:
         """Return the least share of torque limits at which hands hold a state; ∞ if none do.
 
@@ -96,11 +100,14 @@ class JointLoadPrograms:
         more : ndarray, shape (6,), optional
             Wrench that the hands supply besides that for the robot's weight with the limb in the
             air at rest angles, in `WRENCH_UNIT`.
+        multiple : float, optional
+            Of the robot's weight, without that of the links in their joints.
         """
         hands, members = self._wall.screening.hands, np.array(state.members)
         limbs = np.flatnonzero(members >= 0).tolist()
         needed = self._wall.screening.wrenches[state.body] + (0.0 if more is None else more)
         needed[3:] += sum(loads[limb].moment for limb in limbs)
+        needed = multiple * needed
         parts = {limb: hands.part_of(int(members[limb])) for limb in limbs}
         ends = np.cumsum([1, *(each[0].stop - each[0].start for each in parts.values())])
         columns, size = dict(zip(limbs, ends, strict=False)), int(ends[-1])

@@ -7,7 +7,8 @@ the closed hand does to its rock.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from itertools import combinations, pairwise, product
 
@@ -38,7 +39,14 @@ class MoveChecks:
     limits : Limits, optional
         Of every stage.
     settings : PostureSettings, optional
+
+    Attributes
+    ----------
+    multiple : float
+        Multiple of the robot's weight that joints bear in each state; 1 at first.
     """
+
+    multiple: float = 1.0
 
     def __init__(
         self, wall: Wall, limits: Limits | None = None, settings: PostureSettings | None = None
@@ -56,6 +64,12 @@ class MoveChecks:
         self.clearances = Clearances(wall)
         self.programs = JointLoadPrograms(wall, self._limits)
         self.ways = HoldWays(wall, self.clearances, self.settings)
+
+    def bearing(self, multiple: float) -> MoveChecks:
+        """Return the same checks, but of states in which joints bear a multiple of the weight."""
+        other = copy(self)
+        other.multiple, other._known, other._fits = multiple, {}, {}
+        return other
 
     def passes(self, before: State, after: State) -> bool:
         """Return whether one state may follow another: by a lift, a placement or a shift."""
@@ -115,9 +129,23 @@ class MoveChecks:
         loads = {limb: self._loads_of(limb, place, state.body) for limb, place in own.items()}
         for chosen in self._clear(state):
             picked = {limb: loads[limb][k] for limb, k in chosen.items()}
-            if self.programs.share(state, picked, more) <= self.settings.torque_share:
+            if self.share(state, picked, more) <= self.settings.torque_share:
                 return True
         return False
+
+    def share(
+        self, state: State, loads: Mapping[int, LimbLoads], more: Array | None = None
+    ) -> float:
+        """Return the least share of joint torque limits in a state, as `JointLoadPrograms.share`.
+
+        Without ``more``, what a larger multiple of the weight needs may reach the limits: then it
+        counts as the share that is allowed.
+        """
+        found = self.programs.share(state, loads, more)
+        if more is not None or self.multiple <= 1.0 or found > self.settings.torque_share:
+            return found
+        whole = self.programs.share(state, loads, multiple=self.multiple)
+        return max(found, self.settings.torque_share * whole)
 
     def _loads_of(self, limb: int, place: int, body: int) -> list[LimbLoads]:
         """Return the joint loads of a limb at each of the table's joint angles."""

@@ -1,19 +1,41 @@
-"""Words and values that replies have of a climb that was searched for; imports little."""
+"""Words and values that replies have of a climb, and of its search; imports little."""
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from msgspec import Struct
 
 from planner.result import LimitName
 
-__all__ = ["ClimbStatus", "DecidingStage", "Raise", "RefusedMoves"]
+__all__ = ["ClimbProgress", "ClimbStatus", "DecidingStage", "Raise", "RefusedMoves"]
 
 ClimbStatus = Literal["found", "not_proven", "none", "blocked", "unknown"]
 """``found``: a climb, and no other is better by more than was asked for; ``not_proven``: a climb;
 ``none``: it is proven that there is none; ``blocked``: the hands could hold one, but the moves of
 all that were found have no plan; ``unknown``: none was found in time."""
+
+
+class ClimbProgress(NamedTuple):
+    """Progress of the search for a climb.
+
+    Attributes
+    ----------
+    phase : {'search', 'steps', 'moves', 'stages', 'changes'}
+    best, bound : float or None
+        Least load factor of the best climb so far, and the bound of all.
+    seconds : float
+        Since the beginning [s].
+    done, total : int
+        Moves that are planned, and their number; zero in other phases.
+    """
+
+    phase: str
+    best: float | None
+    bound: float | None
+    seconds: float
+    done: int = 0
+    total: int = 0
 
 
 class RefusedMoves(Struct, frozen=True, kw_only=True):

@@ -298,6 +298,8 @@ class Postures:
                 if not share <= self._settings.torque_share:
                     break
                 share = max(share, self._programs.share(held.state, loads, all_))
+            if held.closed is None and share <= self._settings.torque_share:
+                share = max(share, self._checks.share(held.state, loads))
             self._shares[key] = share
         return self._shares[key]
 

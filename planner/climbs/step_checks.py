@@ -187,7 +187,8 @@ class StepChecks:
             swing = np.linspace(off[-1], way[-1], parts + 1)
             air = [self._with_moment(np.zeros(6), limb, body, each) for each in swing]
             air.append(self._with_moment(-wrench, limb, body, own))
-            if self._bears(state, angles) and all(self._bears(lift, angles, at) for at in air):
+            held = self._bears(state, angles) and self._bears(lift, angles)
+            if held and all(self._bears(lift, angles, at) for at in air):
                 yield angles
 
     def _with_moment(self, wrench: Array, limb: int, body: int, angles: Array) -> Array:
@@ -263,7 +264,7 @@ class StepChecks:
         return self._followed[key]
 
     def _bears(self, state: State, angles: Angles, more: Array | None = None) -> bool:
-        """Return whether joints bear a state; ``more`` is as of `JointLoadPrograms.share`."""
+        """Return whether joints bear a state; ``more`` is as of `MoveChecks.share`."""
         loads = dict[int, LimbLoads]()
         for limb, place in enumerate(state.members):
             key = limb, place, state.body, angles[limb].tobytes()
@@ -273,4 +274,4 @@ class StepChecks:
                 )
             if place >= 0:
                 loads[limb] = self._loads[key]
-        return self._checks.programs.share(state, loads, more) <= self._most
+        return self._checks.share(state, loads, more) <= self._most

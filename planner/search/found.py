@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -86,3 +87,18 @@ class Found:
     def gap(self) -> float:
         """Part by which another climb's least load factor may be larger; infinite without one."""
         return self.bound / self.least - 1.0 if self.least > 0.0 else float(np.inf)
+
+    @classmethod
+    def nothing(cls) -> Self:
+        """Return the answer of a search that was broken off before it had one."""
+        return cls(
+            states=(),
+            factors=np.zeros(0),
+            least=-np.inf,
+            bound=np.inf,
+            proof=None,
+            programs=0,
+            lifts=0,
+            seconds=0.0,
+            finished=False,
+        )

@@ -180,20 +180,19 @@ def _search(
     start, goal = (Ends(bodies=at[name], members=members.get(name)) for name in ends)
     left = deadline.left()
     # the rest of the time is for the changes that would raise the load factor, and for the reply
-    most = math.inf if left is None else 0.95 * left / (later + 1)
-    seconds = min(most, part or math.inf)
-    found = find_climb(
-        made.wall,
-        start,
-        goal,
-        name=request.name,
-        limits=request.limits,
-        objective=request.objective,
-        within=request.best_within,
-        at_least=request.at_least,
-        seconds=None if math.isinf(seconds) else seconds,
-        progress=progress.search,
-    )
+    with deadline.within(None if left is None else 0.95 * left / (later + 1)):
+        found = find_climb(
+            made.wall,
+            start,
+            goal,
+            name=request.name,
+            limits=request.limits,
+            objective=request.objective,
+            within=request.best_within,
+            at_least=request.at_least,
+            seconds=part,
+            progress=progress.search,
+        )
     return SoughtClimb(found, made, source.rock, source.rock_pose, start, goal)
 
 

@@ -10,6 +10,7 @@ import pytest
 from hand_models.base import InvalidInputError, Pose
 from planner import Load, Question, Stance, evaluate, find_climb, plan, plan_climb
 from planner.climbs import ClimbStep, MoveChecks, RouteMaker, detours
+from planner.climbs.finding import _Finder
 from planner.question import Limits
 from planner.search import State
 from tests.suite.helpers.climbs import climbed
@@ -125,6 +126,30 @@ def test_a_climb_is_found_and_every_knot_of_it_is_verified():
     assert len(again.knots) == len(found.climb.knots)
     for knot, other in zip(found.climb.knots, again.knots, strict=True):
         assert knot.utilisation == pytest.approx(other.utilisation, abs=1e-6)
+
+
+@pytest.mark.slow
+def test_where_joints_decide_a_better_climb_is_looked_for(monkeypatch):
+    wall = knob_wall()
+    low, high = ends(wall, [0, 1, 2]), ends(wall, [6, 7, 8])
+    torque = {
+        limb: (0.5 * chain.torque_limits).tolist() for limb, chain in wall.robot.chains.items()
+    }
+
+    def found(seconds):
+        limits = Limits(joint_torque=torque)
+        return find_climb(wall, low, high, limits=limits, within=0.02, seconds=seconds)
+
+    better = found(200.0)
+    with monkeypatch.context() as patch:
+        patch.setattr(_Finder, "_climb_higher", lambda _, first, *__: first)
+        first = found(200.0)
+    # by their statics, both are the best
+    assert first.least < 0.9 * first.bound
+    assert better.least > 1.1 * first.least
+    assert better.bound == pytest.approx(first.bound, rel=1e-6)
+    assert all(knot.verified for knot in better.climb.knots)
+    assert better.least == pytest.approx(evaluate(better.route, workers=1).load_factor, rel=1e-6)
 
 
 def test_it_is_proven_that_no_climb_has_a_load_factor_that_hands_do_not_hold():

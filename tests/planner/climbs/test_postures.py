@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 from planner import Question, Stance, plan
 from planner.climbs import ClimbStep, MoveChecks
@@ -104,6 +105,38 @@ def test_the_share_of_torque_limits_is_the_least_with_which_a_plan_exists(state)
 
     assert feasible(1.001)
     assert not feasible(0.999)
+
+
+@pytest.mark.parametrize("state", [State(1, START), State(1, (0, 2, 4, -1))])
+def test_joints_bear_as_many_times_the_weight_as_the_plans_load_factor(state):
+    wall = knob_wall()
+    own = checks().programs
+    loads = {
+        i: own.loads(i, state.members[i], state.body, angles)
+        for i, angles in joints_of(state).items()
+    }
+    # so little torque that it limits the load factor
+    part = 1.2 * own.share(state, loads)
+    torque = {
+        limb: (part * chain.torque_limits).tolist() for limb, chain in wall.robot.chains.items()
+    }
+    found = plan(replace(question(state, joint_torque=torque), want=frozenset(["load_factor"])))
+    factor = found.load_factor
+    assert 1.0 < factor < 1.3
+    assert own.share(state, loads, multiple=0.999 * factor) < part
+    assert own.share(state, loads, multiple=1.001 * factor) > part
+
+
+@settings(max_examples=20, deadline=None)
+@given(multiple=st.floats(1.0, 3.0), members=st.sampled_from([START, (0, 2, 4, -1), (1, 3, -1, 6)]))
+def test_what_bears_a_multiple_of_the_weight_bears_the_weight(multiple, members):
+    state = State(1, members)
+    more = checks().bearing(multiple)
+    if more.borne(state):
+        assert checks().borne(state)
+    # and nothing is taken over from one to the other
+    assert checks().bearing(1.0).passes(state, state) == checks().passes(state, state)
+    assert checks().multiple == 1.0
 
 
 def test_the_weight_of_a_limb_in_the_air_needs_the_moment_of_the_reach_table():
