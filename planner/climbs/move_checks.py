@@ -138,14 +138,23 @@ class MoveChecks:
     ) -> float:
         """Return the least share of joint torque limits in a state, as `JointLoadPrograms.share`.
 
-        Without ``more``, what a larger multiple of the weight needs may reach the limits: then it
-        counts as the share that is allowed.
+        Without ``more`` it is at least `share_of_multiple`, and no more than that where that is
+        beyond what is allowed.
         """
-        found = self.programs.share(state, loads, more)
-        if more is not None or self.multiple <= 1.0 or found > self.settings.torque_share:
-            return found
+        whole = self.share_of_multiple(state, loads) if more is None else 0.0
+        if whole > self.settings.torque_share:
+            return whole
+        return max(whole, self.programs.share(state, loads, more))
+
+    def share_of_multiple(self, state: State, loads: Mapping[int, LimbLoads]) -> float:
+        """Return the least share of torque limits in a state at the multiple; 0 if that is 1.
+
+        The multiple may reach the limits: that counts as the share that is allowed.
+        """
+        if self.multiple <= 1.0:
+            return 0.0
         whole = self.programs.share(state, loads, multiple=self.multiple)
-        return max(found, self.settings.torque_share * whole)
+        return self.settings.torque_share * whole
 
     def _loads_of(self, limb: int, place: int, body: int) -> list[LimbLoads]:
         """Return the joint loads of a limb at each of the table's joint angles."""

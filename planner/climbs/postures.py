@@ -292,14 +292,17 @@ class Postures:
                     return float(np.inf)
                 more -= wrench
             moments = self._in_air(air, held) if air else np.zeros((1, 3))
-            share = self._share_halfway(held, own) if held.phase == "shift" else 0.0
+            share = 0.0
+            if held.closed is None:
+                # most states fail by this
+                share = self._checks.share_of_multiple(held.state, loads)
+            if held.phase == "shift" and share <= self._settings.torque_share:
+                share = max(share, self._share_halfway(held, own))
             for moment in moments:
                 all_ = more + np.array([*np.zeros(3), *moment])
                 if not share <= self._settings.torque_share:
                     break
                 share = max(share, self._programs.share(held.state, loads, all_))
-            if held.closed is None and share <= self._settings.torque_share:
-                share = max(share, self._checks.share(held.state, loads))
             self._shares[key] = share
         return self._shares[key]
 

@@ -12,7 +12,7 @@ from planner import Load, Question, Stance, evaluate, find_climb, plan, plan_cli
 from planner.climbs import ClimbStep, MoveChecks, RouteMaker, detours
 from planner.climbs.finding import _Finder
 from planner.question import Limits
-from planner.search import State
+from planner.search import Found, State
 from tests.suite.helpers.climbs import climbed
 from tests.suite.helpers.knob_walls import best_climb, ends, factor, knob_wall, neighbours
 
@@ -140,16 +140,28 @@ def test_where_joints_decide_a_better_climb_is_looked_for(monkeypatch):
         limits = Limits(joint_torque=torque)
         return find_climb(wall, low, high, limits=limits, within=0.02, seconds=seconds)
 
-    better = found(200.0)
+    better = found(600.0)
     with monkeypatch.context() as patch:
         patch.setattr(_Finder, "_climb_higher", lambda _, first, *__: first)
-        first = found(200.0)
+        first = found(600.0)
     # by their statics, both are the best
     assert first.least < 0.9 * first.bound
     assert better.least > 1.1 * first.least
     assert better.bound == pytest.approx(first.bound, rel=1e-6)
     assert all(knot.verified for knot in better.climb.knots)
     assert better.least == pytest.approx(evaluate(better.route, workers=1).load_factor, rel=1e-6)
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_a_climb_grows_step_by_step_unless_it_is_proven_that_there_is_none(finished, monkeypatch):
+    wall, taken = knob_wall(), []
+    nothing = replace(Found.nothing(), finished=finished)
+    monkeypatch.setattr("planner.climbs.finding.search", lambda *_, **__: nothing)
+    monkeypatch.setattr(_Finder, "_step", lambda _, ends, least: taken.append(least))
+    low, high = ends(wall, [0, 1, 2]), ends(wall, [6, 7, 8])
+    found = find_climb(wall, low, high, at_least=1.3, seconds=60.0)
+    assert taken == ([] if finished else [1.3])
+    assert found.status == ("blocked" if finished else "unknown")
 
 
 def test_it_is_proven_that_no_climb_has_a_load_factor_that_hands_do_not_hold():
