@@ -162,11 +162,10 @@ class _Finder:
             # from one stance to another there are few climbs, and the search finds the best
             self._step((start, goal), max(self._floor, at_least or 0.0))
         self._asks = True
-        for share in (0.5, 1.0):
-            none = found.finished and not found.states
-            if none or self._best is not None or deadline.expired():
-                break
-            found = self._search(start, goal, within, at_least, share)
+        none, known = found.finished and not found.states, self._best is not None
+        done = known and (higher or self._good(within, at_least))
+        if not (none or done or deadline.expired()):
+            found = self._search(start, goal, within, at_least, 1.0)
         if higher:
             found = self._climb_higher(found, (start, goal), within, at_least)
         return self._answer(found, within, at_least)

@@ -12,7 +12,7 @@ from planner import Load, Question, Stance, evaluate, find_climb, plan, plan_cli
 from planner.climbs import ClimbStep, MoveChecks, RouteMaker, detours
 from planner.climbs.finding import _Finder
 from planner.question import Limits
-from planner.search import Found, State
+from planner.search import Found, State, search
 from tests.suite.helpers.climbs import climbed
 from tests.suite.helpers.knob_walls import best_climb, ends, factor, knob_wall, neighbours
 
@@ -162,6 +162,29 @@ def test_a_climb_grows_step_by_step_unless_it_is_proven_that_there_is_none(finis
     found = find_climb(wall, low, high, at_least=1.3, seconds=60.0)
     assert taken == ([] if finished else [1.3])
     assert found.status == ("blocked" if finished else "unknown")
+
+
+@pytest.mark.parametrize("seconds", [None, 600.0])
+def test_after_a_first_climb_the_best_by_statics_is_looked_for_or_in_time_better(
+    seconds, monkeypatch
+):
+    wall, asked = knob_wall(), []
+    low, high = ends(wall, [0, 1, 2]), ends(wall, [6, 7, 8])
+
+    def searched(*given, **named):
+        asked.append(named["passes"] is not None)
+        return search(*given, **named)
+
+    def higher(_, found, *__):
+        asked.append("higher")
+        return found
+
+    monkeypatch.setattr("planner.climbs.finding.search", searched)
+    monkeypatch.setattr(_Finder, "_climb_higher", higher)
+    found = find_climb(wall, low, high, within=0.0, seconds=seconds)
+    assert found.climb is not None
+    # the first without moves
+    assert asked == ([False, True] if seconds is None else [False, "higher"])
 
 
 def test_it_is_proven_that_no_climb_has_a_load_factor_that_hands_do_not_hold():
