@@ -179,8 +179,9 @@ def _search(
     members = {name: made.given[k * limbs : (k + 1) * limbs] for k, name in enumerate(stances)}
     start, goal = (Ends(bodies=at[name], members=members.get(name)) for name in ends)
     left = deadline.left()
-    # the rest of the time is for the changes that would raise the load factor, and for the reply
-    with deadline.within(None if left is None else 0.95 * left / (later + 1)):
+    # the rest is for changes that would raise the load factor, for compliant wrists, and the reply
+    share = 0.95 if request.wrist == "fixed" else 0.6
+    with deadline.within(None if left is None else share * left / (later + 1)):
         found = find_climb(
             made.wall,
             start,
