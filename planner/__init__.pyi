@@ -30,6 +30,7 @@ from .climbs import (
     Raise as Raise,
     RefusedMoves as RefusedMoves,
     find_climb as find_climb,
+    refuse_limits as refuse_limits,
     weakest_state as weakest_state,
     with_compliant_stages as with_compliant_stages,
     with_compliant_wrists as with_compliant_wrists,

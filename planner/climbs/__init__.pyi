@@ -15,5 +15,9 @@ from .outcome import (
     RefusedMoves as RefusedMoves,
 )
 from .raising import raises as raises
-from .routing import ClimbStep as ClimbStep, RouteMaker as RouteMaker
+from .routing import (
+    ClimbStep as ClimbStep,
+    RouteMaker as RouteMaker,
+    refuse_limits as refuse_limits,
+)
 from .stepping import Stepping as Stepping

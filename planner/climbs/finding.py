@@ -367,7 +367,8 @@ class _Finder:
         changes: tuple[tuple[Raise, Question], ...] = ()
         if deciding is not None and not deadline.expired():
             stage = best.result.stages[deciding.stage].question
-            changes = raises(wall, state, stage, deciding.load_factor)
+            with suppress(DeadlineError):
+                changes = raises(wall, state, stage, deciding.load_factor)
         self._seconds["changes"] += time.perf_counter() - begun
         return FoundClimb(
             status=status,

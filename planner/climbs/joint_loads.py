@@ -51,7 +51,9 @@ class JointLoadPrograms:
         self._wall = wall
         first = wall.places[0]
         stance = Stance((first,), wall.bodies[0], robot=wall.robot, joints="solve")
-        self._limits = torque_limits(Question(stance, limits=limits))
+        # other limits may be about hands that this stance has not
+        own = Limits(joint_torque=limits.joint_torque)
+        self._limits = torque_limits(Question(stance, limits=own))
         self._chains = [LimbChain.of(wall.robot, name) for name in wall.robot.limbs]
 
     def loads(self, limb: int, place: int, body: int, angles: Array) -> LimbLoads:

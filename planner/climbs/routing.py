@@ -4,17 +4,49 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise, zip_longest
 from typing import NamedTuple, Self
 
 import numpy as np
+from msgspec import structs
 
 from hand_models.base import Array, Pose
-from planner.question import HandOnHold, Limits, Objective, Stance
-from planner.route import KnotPhase, Move, Route
+from hand_models.rock import Plane
+from hand_models.tile import Surface
+from planner.question import HandOnHold, Limits, Objective, Question, Stance
+from planner.robots import Robot
+from planner.route import KnotPhase, Move, Route, refuse
 from planner.search import Arc, State, Wall
 
-__all__ = ["ClimbStep", "RouteMaker"]
+__all__ = ["ClimbStep", "RouteMaker", "refuse_limits"]
+
+
+def refuse_limits(robot: Robot, limits: Limits, objective: Objective) -> None:
+    """Refuse what no climb of a robot can have, before there is a wall.
+
+    Parameters
+    ----------
+    robot : Robot
+    limits : Limits
+        Of every stage.
+    objective : str
+        Of every stage.
+
+    Raises
+    ------
+    InvalidInputError
+        If a limit is impossible, or names what the robot has not.
+    UnsupportedError
+        If climbs cannot have a limit.
+    """
+    on_rock = partial(HandOnHold, pose=Pose.identity(), hold=Plane(), surface=Surface.named("rock"))
+    hands = tuple(on_rock(limb=limb) for limb in robot.limbs)
+    stance = Stance(hands, Pose.identity(), robot=robot, joints="solve")
+    # changes between knots count in a climb alone
+    of_stage = structs.replace(limits, tension_change=None)
+    Question(stance, limits=of_stage, objective=objective)
+    refuse(Route("", stance, (), limits=limits, objective=objective))
 
 
 class ClimbStep(NamedTuple):

@@ -43,7 +43,8 @@ class MarginSettings:
 
     inside: float = 1e-6
     """Share by which a plan stays inside the largest: rounding must not empty its set."""
-    accuracy: float = 0.01  # of the share with wrists that move: 0.02 N of 2 N
+    accuracy: float = 0.01  # of the share with wrists that move, or less if that is more than
+    least: float = 0.02  # of the largest margin [N]
     found: float = 1e-3
     """Part of the utilisation to which the local search for moving wrists finds the least."""
     none: float = 10.0
@@ -148,6 +149,8 @@ def kept_margins(
     slack = MARGIN_SETTINGS.found * abs(least) if moving else 0.5 * CAP_SLACK
     most = min(asked.utilisation, (1.0 + _cost()) * abs(least))
     budget, kept = max(most, least + slack), dict[float, AnswerT]()
+    largest = max(asked.asked_margins.values(), default=0.0)
+    step = MARGIN_SETTINGS.least / max(largest, MARGIN_SETTINGS.least / MARGIN_SETTINGS.accuracy)
 
     @cache
     def beyond(share: float) -> float:
@@ -161,10 +164,10 @@ def kept_margins(
     try:
         if moving:
             if beyond(0.0) < 0.0 and beyond(1.0) > CAP_SLACK:
-                scipy.optimize.brentq(beyond, 0.0, 1.0, xtol=MARGIN_SETTINGS.accuracy)
+                scipy.optimize.brentq(beyond, 0.0, 1.0, xtol=step)
         else:
             share = _share_of_fixed(free, asked, budget)
-            less = max(share - MARGIN_SETTINGS.accuracy, 0.0)
+            less = max(share - step, 0.0)
             if beyond(share) > CAP_SLACK and beyond(less) > CAP_SLACK:
                 beyond(0.0)
     except DeadlineError:

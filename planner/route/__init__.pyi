@@ -8,6 +8,7 @@ from .climb import (
 )
 from .climbing import plan_climb as plan_climb
 from .evaluation import evaluate as evaluate
+from .first_checks import refuse as refuse
 from .knots import (
     Climb as Climb,
     Failure as Failure,

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,9 @@ from planner.route.com_travel import mass_travel, turn_between
 from planner.route.held import HeldPosture, Posed, hold_with
 
 __all__ = ["Passage"]
+BEYOND_ROWS: Final = 1e-4
+"""Load by which knots may be beyond a hard row [N]: less than the independent check allows of one,
+and ten times what programs over samples leave."""
 
 
 class Passage:
@@ -211,7 +215,7 @@ class Passage:
         with np.errstate(divide="ignore", invalid="ignore"):
             alone = np.where(each > 1e-12, np.concatenate(room)[:, None] / each, np.inf)
         # a reaction may change as far as the first row allows that it alone would break
-        weight = np.where(rows.passive, np.minimum(alone.min(axis=0), 1e3), 0.0) ** 2
+        weight = np.where(rows.passive, np.clip(alone.min(axis=0), 0.0, 1e3), 0.0) ** 2
         scaled = WRENCH_SCALE[:, None] * rows.wrench
         inverse = np.linalg.pinv(scaled * weight @ scaled.T, rcond=1e-10, hermitian=True)
         return np.asarray(weight[:, None] * scaled.T @ inverse * WRENCH_SCALE)
@@ -250,7 +254,7 @@ def _room(first: Array, last: Array) -> Array:
     It is the least over t of (first / t + last / (1 − t)) / 4; below zero where an end is.
     """
     roots = np.sqrt(np.maximum(first, 0.0)) + np.sqrt(np.maximum(last, 0.0))
-    return np.where(np.minimum(first, last) < -1e-7, -np.inf, 0.25 * roots**2)
+    return np.where(np.minimum(first, last) < -BEYOND_ROWS, -np.inf, 0.25 * roots**2)
 
 
 def _peak(first: Array, last: Array, d: Array) -> Array:

@@ -84,28 +84,26 @@ def seek_climb(
     DeadlineError
         If the deadline passes before there is a wall to search.
     """
-    from planner import WallSource, finer_about, weakest_state, with_compliant_stages
+    from planner import (
+        WallSource,
+        finer_about,
+        refuse_limits,
+        weakest_state,
+        with_compliant_stages,
+    )
 
     build = builder_of(request.robot, robots)
     with errors_under("hand"):
         own = None if request.hand is None else own_hand(ParameterTable.of(request.hand))
         robot = build(own)
+    refuse_limits(robot, request.limits, request.objective)
     mesh, pose = _rock(request.rock, robot.hand.table)
     surface = surface_of(request.surface)
     ends = {"start": request.start, "goal": request.goal}
     stances = {name: _stance(name, end, robot.limbs) for name, end in ends.items() if end.body}
     given = {path: at for _, hands in stances.values() for path, at in hands.items()}
-    places = [
-        HandOnHold(
-            limb=hand.limb,
-            pose=at,
-            hold=mesh,
-            surface=surface,
-            hold_pose=pose,
-            grasp=hand.grasp,
-        )
-        for at, hand in given.values()
-    ]
+    on_rock = partial(HandOnHold, hold=mesh, surface=surface, hold_pose=pose)
+    places = [on_rock(limb=hand.limb, pose=at, grasp=hand.grasp) for at, hand in given.values()]
     source = WallSource(
         rock=mesh,
         rock_pose=pose,
@@ -236,7 +234,7 @@ def climb_reply(
         route=None if found.route is None else route_request(request, found.route),
         stages=[] if found.result is None else stage_replies(found.result),
         least_compliant=None if found.compliant is None else found.compliant.load_factor,
-        stages_compliant=[] if found.compliant is None else stage_replies(found.compliant),
+        stages_compliant=None if found.compliant is None else stage_replies(found.compliant),
         knots=None if found.climb is None else len(found.climb.knots),
         placements=len(wall.places),
         bodies=len(wall.bodies),
@@ -269,7 +267,8 @@ def answer_climb(
         If the request is impossible. The error's ``field`` is a path in the request.
     """
     parts = report if request.parts else None
-    return climb_reply(request, seek_climb(request, robots, parts), parts)
+    with deadline.within(request.deadline):
+        return climb_reply(request, seek_climb(request, robots, parts), parts)
 
 
 def _rock(message: requests.MeshMessage | str, numbers: ParameterTable) -> tuple[rock.Mesh, Pose]:

@@ -35,10 +35,10 @@ class ClimbReply(Reply, kw_only=True):
     - ``route``: the climb, as a request at ``crux/<robot>/route``, but without the rock: hands name
       it ``rock``, and it belongs into ``stance.rocks``; null without a climb.
     - ``stages``: all stances of the climb, as in the reply to a route.
-    - ``least_compliant``: least load factor of the same stages with compliant wrists; null unless
-      they were asked for and all have one.
-    - ``stages_compliant``: these stages; empty unless they were asked for, and were planned before
-      the deadline.
+    - ``least_compliant``: least load factor of the same stages with compliant wrists, a lower bound
+      where its status is ``at_least``; null unless they were asked for and all have one.
+    - ``stages_compliant``: these stages; null unless they were asked for, there is a climb, and all
+      were planned before the deadline.
     - ``knots``: number of the climb's knots; null without a climb.
     - ``placements``, ``bodies``: number of placements of hands, and of poses of the body, of which
       climbs were made.
@@ -62,7 +62,7 @@ class ClimbReply(Reply, kw_only=True):
     route: RouteRequest | None
     stages: list[RouteStageReply]
     least_compliant: float | None = None
-    stages_compliant: list[RouteStageReply] = []
+    stages_compliant: list[RouteStageReply] | None = None
     knots: int | None
     placements: int
     bodies: int

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hand_models.base import InvalidInputError, Pose
-from planner import Load, Question, Stance, evaluate, find_climb, plan, plan_climb
-from planner.climbs import ClimbStep, MoveChecks, RouteMaker, detours
+from hand_models.base import CruxError, InvalidInputError, Pose
+from planner import DeadlineError, Load, Question, Stance, evaluate, find_climb, plan, plan_climb
+from planner.climbs import ClimbStep, MoveChecks, RouteMaker, detours, refuse_limits
 from planner.climbs.finding import _Finder
-from planner.question import Limits
+from planner.question import ForceCap, Limits
 from planner.search import Found, State, search
 from tests.suite.helpers.climbs import climbed
 from tests.suite.helpers.knob_walls import best_climb, ends, factor, knob_wall, neighbours
@@ -185,6 +185,38 @@ def test_after_a_first_climb_the_best_by_statics_is_looked_for_or_in_time_better
     assert found.climb is not None
     # the first without moves
     assert asked == ([False, True] if seconds is None else [False, "higher"])
+
+
+def test_a_deadline_in_the_search_for_changes_leaves_the_climb(monkeypatch):
+    def late(*_):
+        raise DeadlineError(1.0, "a plan was found")
+
+    monkeypatch.setattr("planner.climbs.finding.raises", late)
+    wall = knob_wall()
+    found = find_climb(wall, ends(wall, [1], START), ends(wall, [1], START), within=0.1)
+    assert (found.status, found.raises) == ("found", ())
+
+
+@pytest.mark.parametrize(
+    ("limits", "field"),
+    [
+        (Limits(margins="if_possible"), "limits.margins"),
+        (Limits(palm_margin=2.0), "limits.palm_margin"),
+        (Limits(tension_change=1e-6), "limits.tension_change"),
+        (Limits(joint_torque={"front_left": [1.0]}), "limits.joint_torque.front_left"),
+        (Limits(per_hand={"none": ForceCap(400.0)}), "limits.per_hand.none"),
+    ],
+)
+def test_what_no_climb_can_have_is_refused_before_there_is_a_wall(limits, field):
+    with pytest.raises(CruxError) as caught:
+        refuse_limits(knob_wall().robot, limits, "max_margin")
+    assert caught.value.field == field
+
+
+def test_limits_of_hands_and_changes_of_tension_are_those_of_a_climb():
+    caps = {"front_left": ForceCap(400.0)}
+    refuse_limits(knob_wall().robot, Limits(per_hand=caps, tension_change=5.0), "min_effort")
+    MoveChecks(knob_wall(), Limits(per_hand=caps, tension_change=5.0))
 
 
 def test_it_is_proven_that_no_climb_has_a_load_factor_that_hands_do_not_hold():
