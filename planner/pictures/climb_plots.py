@@ -212,6 +212,7 @@ def plot_wall(found: FoundClimb, rock: Mesh, rock_pose: Pose, path: Path) -> Non
         )
         axes.plot(*flat([wall.bodies[deciding.body]]).T, "P", color=COLOUR_OF["red"], markersize=8)
     axes.set(aspect="equal", xlabel="across [m]", ylabel="up the rock [m]")
+    axes.locator_params(axis="x", nbins=5)  # more numbers of a narrow wall would touch
     axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=4, frameon=False)
     _draw_factors(lower, found)
     figure.suptitle(f"{len(wall.places)} placements, {len(wall.bodies)} poses of the body")

@@ -145,10 +145,8 @@ def plan_command(
     "--output",
     "picture",
     type=options.OutputFile(*options.PICTURE_ENDINGS),
-    default="crux-demo.png",
-    show_default=True,
     metavar="FILE",
-    help="Where the picture goes.",
+    help="Where the picture goes; crux-demo.png by default.",
 )
 @click.option(
     "--climb",
@@ -163,18 +161,26 @@ def plan_command(
 @options.own_options
 @options.json_option
 def demo_command(
-    picture: Path, folder: Path | None, page: Path | None, own: options.Own, as_json: bool
+    picture: Path | None,
+    folder: Path | None,
+    page: Path | None,
+    own: options.Own,
+    as_json: bool,
 ) -> int:
     """Start the service, ask it for a plan of a real stance, and draw the answer.
 
     A robot of --robot whose limbs do not reach that stance's holds is planned for without joints.
     """
     if folder is not None:
+        if picture is not None:
+            said = f"is for the picture of a plan, got {picture}: give --climb DIR, without -o"
+            raise InvalidInputError(said, field="-o")
         from service import climbs
         from service.commands.routes import search_climb
 
         asked = own.asked(climbs.demo_request())
         return search_climb(asked, folder, options.WorkersOption(None, None), own, as_json, page)
+    picture = picture or Path("crux-demo.png")
     tables.write_alone(picture)
     request = options.with_extras(own.asked(stances.read_request("wall-300-joints")))
     serving.start_zenoh_log()

@@ -32,6 +32,8 @@ SMALL = ("climb", "small-wall", "--spacing", "0.16", "--stand-off", "0.6", "--st
         ((*SMALL, "--from", "nan,0,0", "--to", "height:1"), "--from"),
         ((*SMALL, *ENDS, "--surface", "glass"), "surface"),
         ((*SMALL, *ENDS, "--time", "0"), "--time"),
+        ((*SMALL, *ENDS, "--wrist-travel", "0.1", "0", "0"), "--wrist-travel"),
+        ((*SMALL, *ENDS, "--wrist-travel", "0.01", "0", "0"), "requires wrist 'compliant'"),
         ((*SMALL, *ENDS, "--at-least", "nan"), "--at-least"),
         ((*SMALL, *ENDS, "--best-within", "x"), "--best-within"),
         ((*SMALL, "--to", "height:1"), "--from"),
@@ -45,6 +47,13 @@ SMALL = ("climb", "small-wall", "--spacing", "0.16", "--stand-off", "0.6", "--st
 def test_what_is_impossible_is_refused(given, said, tmp_path, capsys):
     assert run_command_line([*given, "-o", str(tmp_path / "out"), "--workers", "1"]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_the_picture_of_a_plan_is_no_part_of_a_climb(tmp_path, capsys):
+    asked = ["demo", "--climb", str(tmp_path / "climb"), "-o", str(tmp_path / "demo.png")]
+    assert run_command_line(asked) == BAD_INPUT
+    assert "give --climb DIR, without -o" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_mesh_that_faces_the_other_way_is_refused(tmp_path, capsys):
