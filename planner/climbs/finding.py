@@ -181,13 +181,13 @@ class _Finder:
         Returns the answer of the search that has found the best climb.
         """
         high, checks = self._bound, self._checks
-        while self._best is not None and deadline.left() and not self._good(within, at_least):
+        while self._best is not None and not (deadline.expired() or self._good(within, at_least)):
             least = self._best.least
             multiple = max((least * high) ** 0.5, at_least or 0.0)
             if high <= (1.0 + within) * least or multiple >= high:
                 break
             self._checks = checks.bearing(multiple)
-            self._postures = Postures(self._checks)
+            self._postures = self._postures.with_checks(self._checks)
             again = self._search(*ends, 0.0, multiple, 0.3, multiple)
             if self._best.least > least:
                 found = again

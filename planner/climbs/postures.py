@@ -8,6 +8,7 @@ joints bear what the hands hold, in all states of the climb.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from itertools import combinations, product
 from typing import NamedTuple
@@ -80,6 +81,15 @@ class Postures:
         self._off = dict[tuple[Stay, int, Stay, int], NDArray[np.bool_]]()
         self._moments = dict[tuple[object, ...], Array]()
         self._shares = dict[tuple[object, ...], float]()
+
+    def with_checks(self, checks: MoveChecks) -> Postures:
+        """Return the same choice by other checks of the same wall: loads and clearances stay known.
+
+        What is known of whole states, of which some were refused, does not.
+        """
+        other = copy(self)
+        other._checks, other._shares = checks, {}
+        return other
 
     def choose(
         self, steps: Sequence[ClimbStep], without: Collection[Swung] = ()
