@@ -115,10 +115,7 @@ def without_margins(prepared: PreparedStance) -> PreparedStance:
     prepared : PreparedStance
     """
     limits = prepared.question.limits
-    none = limits.with_share(0.0)
-    if limits.asked_margins == none.asked_margins:
-        return prepared
-    return prepared.with_margins(none)
+    return prepared.with_margins(limits.with_share(0.0)) if limits.asked_margins else prepared
 
 
 def kept_margins(
@@ -149,8 +146,8 @@ def kept_margins(
     slack = MARGIN_SETTINGS.found * abs(least) if moving else 0.5 * CAP_SLACK
     most = min(asked.utilisation, (1.0 + _cost()) * abs(least))
     budget, kept = max(most, least + slack), dict[float, AnswerT]()
-    largest = max(asked.asked_margins.values(), default=0.0)
-    step = MARGIN_SETTINGS.least / max(largest, MARGIN_SETTINGS.least / MARGIN_SETTINGS.accuracy)
+    margins, settings = asked.asked_margins, MARGIN_SETTINGS
+    step = min([settings.accuracy, *(settings.least / each for each in margins.values())])
 
     @cache
     def beyond(share: float) -> float:
@@ -174,7 +171,7 @@ def kept_margins(
         if not kept:
             raise
     share = max(kept)
-    return KeptMargins(asked.asked_margins, share, least, budget), kept[share]
+    return KeptMargins(margins, share, least, budget), kept[share]
 
 
 def _cost() -> float:

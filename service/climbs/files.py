@@ -102,17 +102,19 @@ def write_search(
             files["certificate"]
         )
     compliant = None if found.compliant is None else found.compliant.route
-    for name, route in {"route": found.route, "compliant route": compliant}.items():
+    routes = {"route": found.route, "compliant route": compliant}
+    if found.route is None:
+        for name in ("rock", *routes):
+            files.pop(name).unlink(missing_ok=True)
+        return files
+    write_rock(sought.rock.triangles, files["rock"])
+    pose = answering.pose_of_request(sought.rock_pose)
+    rocks = {"rock": requests.MeshMessage(file=files["rock"].name, pose=pose)}
+    for name, route in routes.items():
         if route is None:
             files.pop(name).unlink(missing_ok=True)
             continue
         given = answering.route_request(request, route)
-        pose = answering.pose_of_request(sought.rock_pose)
-        rocks = {"rock": requests.MeshMessage(file=files["rock"].name, pose=pose)}
         stance = msgspec.structs.replace(given.stance, rocks=rocks)
         write_stance(msgspec.structs.replace(given, stance=stance), files[name])
-    if found.route is None:
-        files.pop("rock").unlink(missing_ok=True)
-    else:
-        write_rock(sought.rock.triangles, files["rock"])
     return files
