@@ -22,6 +22,7 @@ from service.commands.stances import read_request
 from tests.planner.solving.test_spread import STRENGTHS, drawn, entry, seat, with_wrists
 from tests.suite.helpers.checks import problems
 from tests.suite.helpers.stances import CALIBRATION_LOAD, ask, moved, on_wall
+from tests.suite.helpers.unseen_samples import both_plans, sent, unseen_samples
 
 SEEN = (
     drawn(55.0, finger=seat(0.0241)),
@@ -125,6 +126,16 @@ def test_tensions_that_stay_hold_in_more_samples_of_the_overhang():
     assert robust.kept.holds >= 2 * least.kept.holds
     assert robust.kept.without < least.kept.without / 2
     assert robust.feedback.holds >= least.feedback.holds
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stance", ["slab", "overhang"])
+def test_where_samples_are_new_its_tensions_stay_in_balance(stance):
+    asked = replace(question(read_request(stance)), want=frozenset())
+    least, robust = sent(asked, both_plans(asked), unseen_samples(asked, 3, 40))
+    assert robust.kept >= least.kept + 0.15
+    assert robust.kept_without <= least.kept_without / 3
+    assert robust.feedback >= least.feedback - 0.05
 
 
 def test_neither_place_nor_order_matters():
