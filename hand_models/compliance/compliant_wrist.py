@@ -1,8 +1,9 @@
 """Wrench space of a hand with driven tendons and a compliant wrist.
 
 The hand has closed at the tensions f of its tendons; then its wrist moves by a twist ξ, and each
-motor keeps its tension. The loads are affine in f at a given ξ and curved in ξ, so that the set
-linearised about y = (f, ξ) is exact there, and a good approximation within about 1 mm and 20 N.
+motor keeps its tension. At a given ξ the loads are affine in f, in pieces between which a tendon
+begins to slip or to stick; in ξ they are curved. So the set linearised about y = (f, ξ) is exact
+there, and a good approximation within about 1 mm and 20 N.
 """
 
 from __future__ import annotations

@@ -1,13 +1,19 @@
 """Hands whose tendons are driven while their wrists settle: loads, palm and linearised sets."""
 
+import math
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
 from hand_models.base import InvalidFieldError
-from hand_models.compliance import CompliantHand, CompliantWrist, CompliantWrists
+from hand_models.compliance import CompliantHand, CompliantWrist, CompliantWrists, Gripper
 from hand_models.compliance.compliant_hand import CompliantHands
-from hand_models.hand import WristTravel
+from hand_models.hand import FINGERS, Grasp, SpinyHand, WristTravel
+from hand_models.parameters import ParameterTable, Quantity, experiment_table, hand_table
+from hand_models.rock import Cylinder
+from hand_models.tile import Surface
 from tests.hand_models.compliance.test_compliant_hand import compliant
 
 NAMES = ("pinch", "plane")
@@ -35,6 +41,66 @@ def test_at_the_closing_tension_it_is_the_hand_that_keeps_its_tension(name: str)
     kept = CompliantHand(hand.settled, scheme="tension").loads(twists)
     found = hand.loads(twists, np.tile(hand.preload, (5, 1)))
     np.testing.assert_allclose(found.tile_loads, kept.tile_loads, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_at_a_pose_loads_are_affine_in_the_tensions_in_few_pieces(name: str) -> None:
+    """Between two of them a tendon begins to slip or to stick at a tile."""
+    hand, rng = driven(name), np.random.default_rng(2)
+    tiles = len(hand.settled.tiles)
+    for _ in range(10):
+        twist = rng.uniform(-1.0, 1.0, 6) * [4e-3, 2e-3, 1e-3, 0.02, 0.04, 0.02]
+        ends = rng.uniform(0.0, 60.0, 4), rng.uniform(60.0, 150.0, 4)
+        along = np.linspace(0.0, 1.0, 401)[:, None]
+        found = hand.loads(np.tile(twist, (401, 1)), (1.0 - along) * ends[0] + along * ends[1])
+        bent = np.abs(np.diff(found.tile_loads, 2, axis=0)).max(axis=(1, 2)) > 1e-8
+        # a bend between two of the points shows at both
+        assert bent.sum() <= 4 * tiles
+
+
+def of_a_test(values: Mapping[str, tuple[float, str]]) -> dict[str, Quantity]:
+    return {name: Quantity(*value, "assumed", "of a test") for name, value in values.items()}
+
+
+@pytest.mark.parametrize("diameter", [0.3, 0.7])
+def test_inner_fingers_whose_tensions_are_kept_carry_what_those_of_a_gripper_do(
+    diameter: float,
+) -> None:
+    """The gripper has the hand's numbers here; the beds under its tiles are always hard."""
+    hard = of_a_test({"bed_stiffness": (1e9, "N/m")})
+    table = hand_table().replaced(ParameterTable({"tile": hard}))
+    hand = SpinyHand(table)
+    grasp = Grasp(outer_rotation=math.pi, palm=False)
+    settled = hand.settle(Cylinder(diameter), Surface.named("sandpaper-36"), grasp)
+    driven_hand = CompliantHand(settled, scheme="tension")
+    joints = dict(zip(FINGERS, (frame.joint for frame in driven_hand.frames), strict=True))
+    inner, outer = joints["inner_left"], joints["outer_left"]
+    own = of_a_test(
+        {
+            "base_half_spacing": (0.5 * float(inner[0] - outer[0]), "m"),
+            "added_radius": (0.0, "m"),
+            "origin_height": (0.0, "m"),
+            "entry_friction": (driven_hand.fingers[1].tendon.entry_friction, "1"),
+        }
+    )
+    sections = dict(table.sections)
+    sections["gripper"] = {**experiment_table().sections["gripper"], **own}
+    gripper = Gripper(diameter, settled.closing_tension, table=ParameterTable(sections))
+    # in the plane, about the point midway between the proximal joints
+    moved = np.array([[0, 0, 0], [8e-4, 0, 0], [0, -4e-4, 0], [0, 0, 2e-4], [-4e-4, -3e-4, 1e-4]])
+    middle = 0.5 * (inner + outer)
+    twists = np.zeros((len(moved), 6))
+    twists[:, [0, 2, 4]] = moved
+    turn = moved[:, 2]
+    # H turns about its origin: the middle has to be where the gripper's frame goes
+    twists[:, 0] -= np.sin(turn) * middle[2] + (np.cos(turn) - 1.0) * middle[0]
+    twists[:, 2] -= (np.cos(turn) - 1.0) * middle[2] - np.sin(turn) * middle[0]
+    found, (right, _) = driven_hand.loads(twists), gripper.finger_loads(moved)
+    for i in (FINGERS.index("inner_left"), FINGERS.index("inner_right")):
+        tiles = driven_hand.tiles_of(i)
+        np.testing.assert_allclose(found.shears[:, tiles], right.shears, atol=1e-9)
+        np.testing.assert_allclose(found.normals[:, tiles], right.normals, atol=1e-9)
+    assert np.abs(right.normals[1:] - right.normals[0]).max(axis=1).min() > 0.05  # [N]
 
 
 def test_many_hands_at_once_are_each_alone() -> None:
