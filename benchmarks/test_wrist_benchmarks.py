@@ -1,6 +1,8 @@
-"""How long a floating wrist takes: its linearised set, its pose for a wrench, its searches."""
+"""How long wrists that move take: linearised sets, poses for a wrench, searches, plans."""
 
 import math
+from dataclasses import replace
+from itertools import cycle
 
 import numpy as np
 import pytest
@@ -16,7 +18,11 @@ from hand_models.compliance import (
     wrist_pose,
 )
 from hand_models.fixed_wrist import wrench_space
+from planner import KnownStance, WrenchStream, plan
+from service.answering.questions import question
+from service.commands.stances import read_request
 from tests.suite.helpers.hands import HAND, ROCK
+from tests.suite.helpers.stances import complying
 
 pytestmark = pytest.mark.slow
 
@@ -80,3 +86,34 @@ def test_search_of_a_whole_hand(benchmark, per_axis):
     wrist = FloatingWrist(CompliantHand(settled()))
     found = benchmark.pedantic(search_grid, (wrist, per_axis), rounds=1)
     assert found.tried == per_axis**6
+
+
+COMPLIANT = complying(question(read_request("wall-300")))
+"""Four compliant hands at rest; nothing of their wrists is known from before."""
+
+WRENCHES = [
+    COMPLIANT.needed_wrench() + k * np.array([0.5, -0.3, 0.2, 0.02, 0.01, -0.03]) for k in range(4)
+]
+"""Body wrenches 1 N apart [N, N·m]."""
+
+
+@pytest.mark.benchmark(group="four compliant hands")
+@pytest.mark.parametrize("want", [(), ("load_factor",)], ids=["plan", "with load factor"])
+def test_plan_of_compliant_wrists(benchmark, want):
+    asked = replace(COMPLIANT, want=frozenset(want))
+    assert benchmark(plan, asked).verified
+
+
+@pytest.mark.benchmark(group="four compliant hands")
+def test_next_wrench_of_compliant_wrists(benchmark):
+    known, wrenches = KnownStance(COMPLIANT), cycle(WRENCHES)
+    known.plan(next(wrenches))
+    assert benchmark(lambda: known.plan(next(wrenches))).verified
+
+
+@pytest.mark.benchmark(group="four compliant hands")
+def test_set_points_of_compliant_wrists(benchmark):
+    wrenches = cycle(WRENCHES)
+    with WrenchStream(COMPLIANT) as stream:
+        stream.set_points(next(wrenches))
+        assert benchmark(lambda: stream.set_points(next(wrenches))).verified
