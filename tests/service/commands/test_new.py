@@ -45,6 +45,17 @@ def test_a_new_stance_is_planned_as_the_bundled_wall(start, capfd):
     assert all(len(hand["seating"]["pose"]["orientation"]) == 4 for hand in found["hands"])
 
 
+def test_a_new_stance_says_how_wrists_give(start, capfd):
+    file = start("stance")
+    text = file.read_text(encoding="utf-8").replace('# wrist = "compliant"', 'wrist = "compliant"')
+    before, after = text.split("# [stance.limb_stiffness]")
+    lines = [line.removeprefix("# ") for line in after.splitlines()]
+    file.write_text("\n".join([before, "[stance.limb_stiffness]", *lines]), encoding="utf-8")
+    wrists = [hand["wrist"] for hand in planned(capfd, str(file))["hands"]]
+    assert [wrist["mode"] for wrist in wrists] == ["compliant", "fixed", "fixed", "fixed"]
+    assert len(wrists[0]["pose_target"]) == 6
+
+
 @pytest.mark.usefixtures("blank_pictures")
 def test_a_new_route_starts_as_a_bundled_one_and_runs_from_end_to_end(start, tmp_path):
     file, out = start("route"), tmp_path / "out"
