@@ -72,7 +72,8 @@ def least_use(
         Largest number of conic programs.
     near : WristSolution, optional
         Plan of similar hands, from which the search starts. If that leads to a plan beyond
-        utilisation 1, the search continues from that plan to the largest multiple that can be held.
+        utilisation 1, the search continues from that plan to the largest multiple that can be held;
+        where it finds none, it starts anew, as without a plan.
 
     Returns
     -------
@@ -101,7 +102,7 @@ def least_use(
         return plan, None
     most: LargestFactor | None = None
     if not _held(plan) and np.abs(hands.wrench[:6]).max() > TOLERANCES.body_wrench:
-        along = budget.part(190)  # programs
+        along = budget.part(SETTINGS.along_programs)
         for way in _ways(hands, plan, along, up=near is None and hands.together is None):
             if most is None or way.most.factor > most.factor:
                 most = way.most
@@ -110,6 +111,14 @@ def least_use(
             plan = _better(plan, onward)
             if same or _held(plan):
                 break
+        if most is None and not deadline.expired():
+            # the way down from a plan may end at its first step
+            if near is not None:
+                anew, most = least_use(hands, budget)
+                plan = _better(plan, anew)
+            elif plan.exact and hands.together is not None:
+                up = next(_ways(hands, plan, budget.part(SETTINGS.along_programs)), None)
+                most = None if up is None else up.most
     if _held(plan) and most is not None and most.factor < 1.0:
         most = None
     return plan, most

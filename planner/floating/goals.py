@@ -34,6 +34,7 @@ class FloatingSettings:
     Then the best plan found is returned. Four floating hands take some ten seconds."""
     first_programs: int = 70  # for a search for a first plan, at most
     first_relaxed: int = 140  # the same of compliant wrists, whose programs are smaller steps
+    along_programs: int = 190  # for a search along the multiples of the body wrench, at most
     effort_programs: int = 110  # for the search for least effort, at most
     rounds: int = 40  # from one starting point, at most
     followed: int = 4  # steps of relaxed programs until one of them lowers the merit, at most

@@ -61,7 +61,7 @@ class RobustSettings:
     """Samples that take each place: with 4 the tenth of an overhang's load factors changes by 6 %
     (rms) with the seed, with 8 by 3 %."""
     searches: int = 64
-    """Samples where wrists are compliant, a power of two: they take 0.3 to 0.7 s each."""
+    """Samples where wrists are compliant, a power of two: they take about a second each."""
     least: int = 16
     """Least number of these that count where a deadline leaves no time for all."""
     late: str = "all samples were planned"  # what a deadline may leave unfinished
