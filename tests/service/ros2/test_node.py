@@ -160,6 +160,14 @@ def test_ros_sees_the_node_with_its_services_and_topics(call: Caller, service: S
     assert service.ready["ros2"] == names
 
 
+def test_health_is_among_the_diagnostics(diagnostics: queue.Queue) -> None:
+    state = state_with(diagnostics, 0, level=0)
+    assert state["name"] == "crux/robosimian: service"
+    values = values_of(state)
+    assert values["processes: streams, idle"] == "1"
+    assert int(values["replied"]) >= 0
+
+
 def test_a_plan_is_the_one_in_process_and_wrenches_are_of_the_world_on_the_robot(
     call: Caller,
 ) -> None:
@@ -354,14 +362,6 @@ def state_with(got: queue.Queue, which: int, level: int) -> dict[str, Any]:
 
 def values_of(state: dict[str, Any]) -> dict[str, str]:
     return {each["key"]: each["value"] for each in state["values"]}
-
-
-def test_health_is_among_the_diagnostics(diagnostics: queue.Queue) -> None:
-    state = state_with(diagnostics, 0, level=0)
-    assert state["name"] == "crux/robosimian: service"
-    values = values_of(state)
-    assert values["processes: streams, idle"] == "1"
-    assert int(values["replied"]) >= 0
 
 
 def test_published_wrenches_get_set_points_with_their_stamp(
