@@ -66,4 +66,5 @@ from .pictures import (
     SERIES_COLOURS as SERIES_COLOURS,
     write_picture as write_picture,
 )
+from .roots import root_between as root_between
 from .tolerances import BASE_TOLERANCES as BASE_TOLERANCES, BaseTolerances as BaseTolerances

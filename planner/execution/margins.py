@@ -11,12 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
-import scipy
 
+from hand_models.base import root_between
 from hand_models.parameters import bundled_table
 from planner import deadline, programs
 from planner.deadline import DeadlineError
@@ -149,7 +148,6 @@ def kept_margins(
     margins, settings = asked.asked_margins, MARGIN_SETTINGS
     step = min([settings.accuracy, *(settings.least / each for each in margins.values())])
 
-    @cache
     def beyond(share: float) -> float:
         """Return by how much the plan that keeps a share exceeds the budget."""
         deadline.check("a plan was found")
@@ -160,13 +158,14 @@ def kept_margins(
 
     try:
         if moving:
-            if beyond(0.0) < 0.0 and beyond(1.0) > CAP_SLACK:
-                scipy.optimize.brentq(beyond, 0.0, 1.0, xtol=step)
+            if (without := beyond(0.0)) < 0.0 and (whole := beyond(1.0)) > CAP_SLACK:
+                root_between(beyond, (0.0, 1.0), (without, whole), step)
         else:
             share = _share_of_fixed(free, asked, budget)
-            less = max(share - step, 0.0)
-            if beyond(share) > CAP_SLACK and beyond(less) > CAP_SLACK:
-                beyond(0.0)
+            # each share once: the first may be zero
+            for each in dict.fromkeys((share, max(share - step, 0.0), 0.0)):
+                if beyond(each) <= CAP_SLACK:
+                    break
     except DeadlineError:
         if not kept:
             raise

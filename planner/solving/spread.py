@@ -16,11 +16,9 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Final
 
-import scipy
-
+from hand_models.base import root_between
 from hand_models.hand import SettledHand
 from hand_models.parameters import FITTED_SURFACE, ParameterTable, draw_table, surface_table
 from planner import deadline
@@ -166,7 +164,6 @@ def _threshold(
         own = ParameterTable({preset: {"shear_limit": strength}})
         return DrawnHand(stance.robot.hand, table.replaced(own), None, {})
 
-    @cache
     def beyond(weakness: float) -> float:
         """Return by how much the utilisation exceeds the cap on rock of 1 / weakness."""
         deadline.check(ALL_PLANNED)
@@ -180,12 +177,13 @@ def _threshold(
     if all(weakest.surface(hand.surface) == hand.surface for hand in stance.hands):
         return None
     ratio: float | None = least
-    if beyond(1.0 / most) > 0.0:
+    ends = 1.0 / most, 1.0 / least
+    if (on_strongest := beyond(ends[0])) > 0.0:
         ratio = None
-    elif beyond(1.0 / least) > 0.0:
+    elif (on_weakest := beyond(ends[1])) > 0.0:
         # the utilisation is nearly linear in the weakness
         accuracy = THRESHOLD_SETTINGS.accuracy / most
-        ratio = 1.0 / float(scipy.optimize.brentq(beyond, 1.0 / most, 1.0 / least, xtol=accuracy))
+        ratio = 1.0 / root_between(beyond, ends, (on_strongest, on_weakest), accuracy)
     share = 0.0 if ratio is None else (most - ratio) / (most - least)
     strength = None if ratio is None else ratio * sandpaper
     return StrengthThreshold(preset, strength, ratio, [least, most], share)
