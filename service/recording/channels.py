@@ -61,7 +61,6 @@ def topic_of(key: str, kind: str) -> str:
     return f"/{service_key(robot, name)}/{kind}"
 
 
-@cache
 def channel_schema(kind: str) -> bytes:
     """Return the plain JSON Schema of a kind of message, encoded.
 

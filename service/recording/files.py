@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -47,12 +48,21 @@ class RecordingFile:
         return self._whole
 
     def add(
-        self, topic: str, schema: tuple[str, str, bytes], data: bytes, at: int, number: int = 0
+        self,
+        topic: str,
+        schema: Callable[[], tuple[str, str, bytes]],
+        data: bytes,
+        at: int,
+        number: int = 0,
     ) -> None:
-        """Add a message: topic, its schema (name, encoding, data), bytes, Unix time [ns]."""
+        """Add a message: topic, its schema (name, encoding, data), bytes, Unix time [ns].
+
+        The schema is asked for with the first message of a topic.
+        """
         if topic not in self._channels:
-            known = self._writer.register_schema(*schema)
-            coded = "json" if schema[1] == "jsonschema" else "cdr"
+            name, encoding, described = schema()
+            known = self._writer.register_schema(name, encoding, described)
+            coded = "json" if encoding == "jsonschema" else "cdr"
             self._channels[topic] = self._writer.register_channel(topic, coded, known)
         # a sequence number has 32 bits
         self._writer.add_message(self._channels[topic], at, data, at, number % 2**32)

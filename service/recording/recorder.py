@@ -7,6 +7,7 @@ import logging
 import re
 import threading
 import time
+from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, Final, NamedTuple
@@ -84,6 +85,10 @@ class RosSample(NamedTuple):
     kind: str
     definition: str
     data: bytes
+
+    def schema(self) -> tuple[str, str, bytes]:
+        """Return the schema of its channel: name, encoding, and the definition of the type."""
+        return self.kind, "ros2msg", self.definition.encode()
 
 
 class Recorder:
@@ -275,8 +280,7 @@ class Recorder:
 
     def _write(self, file: RecordingFile, at: int, item: Exchange | RosSample) -> None:
         if isinstance(item, RosSample):
-            schema = (item.kind, "ros2msg", item.definition.encode())
-            file.add(item.topic, schema, item.data, at)
+            file.add(item.topic, item.schema, item.data, at)
             self._added()
             return
         number = 0 if item.request is None else self._count + 1
@@ -305,7 +309,7 @@ class Recorder:
                 payload=lost,
             )
             kind, key = QuestionRecord.__name__, service_key(self._robot, QUESTIONS_TOPIC)
-            schema = (kind, "jsonschema", channel_schema(kind))
+            schema = partial(_schema, kind, kind)
             file.add(f"/{key}/{kind}", schema, msgspec.json.encode(about), at, number)
         self._added()
 
@@ -314,8 +318,13 @@ class Recorder:
 
 
 def _add(file: RecordingFile, key: str, kind: str, text: bytes, at: int, number: int) -> None:
-    schema = (f"crux.{kind}", "jsonschema", channel_schema(kind))
+    schema = partial(_schema, f"crux.{kind}", kind)
     file.add(topic_of(key, kind), schema, text, at, number)
+
+
+def _schema(name: str, kind: str) -> tuple[str, str, bytes]:
+    """Return the schema of a channel of one kind of message: name, encoding, and the schema."""
+    return name, "jsonschema", channel_schema(kind)
 
 
 def _request_kind(key: str) -> str:
