@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cached_property, lru_cache
 from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
@@ -97,13 +96,12 @@ TILE_PARTS: Final = {nails: _parts_of_hand(nails=nails) for nails in (False, Tru
 """Finger and part of each tile of a hand, by whether the hand has nails."""
 
 
-@lru_cache(maxsize=KEPT_NAMES)
-def tile_index_of(counts: tuple[int, ...]) -> TileIndex:
+def tile_index_of(counts: Sequence[int]) -> TileIndex:
     """Return the index arrays of all tiles.
 
     Parameters
     ----------
-    counts : tuple of int, length H
+    counts : sequence of int, length H
         Number of tiles (and nails) of each hand.
     """
     hand = np.arange(len(counts)).repeat(counts)
@@ -157,15 +155,18 @@ class ContactPattern(NamedTuple):
     holding: tuple[int, ...]
 
 
-def contact_pattern_of(hands: tuple[tuple[SettledTile, ...], ...]) -> ContactPattern:
+def contact_pattern_of(
+    hands: Sequence[tuple[SettledTile, ...]], places: TileIndex
+) -> ContactPattern:
     """Return the contact states of all tiles, as arrays.
 
     Parameters
     ----------
-    hands : tuple of tuple of SettledTile
+    hands : sequence of tuple of SettledTile
         Tiles of each hand, with their contact states.
+    places : TileIndex
+        Index arrays of these tiles.
     """
-    places = tile_index_of(tuple(map(len, hands)))
     contacts = np.array([CONTACT_CODES[tile.contact] for hand in hands for tile in hand])
     away = contacts != CONTACT_CODES["face"]
     touches = 1.0 - away
@@ -206,6 +207,8 @@ class HandBatch:
         Angle of each phalanx from x toward z of its finger frame F [rad].
     bends : ndarray, shape (F, 3)
         Angle of each joint, relative to the phalanx before it [rad].
+    friction : ndarray, shape (T,)
+        Friction coefficient of each tile's surface.
     palm_limits : ndarray, shape (H, 2)
         Limits of each palm's shear and pressing [N]; infinite for a palm that touches nothing.
     """
@@ -219,18 +222,13 @@ class HandBatch:
     lateral_shares: Array
     angles: Array
     bends: Array
+    friction: Array
     palm_limits: Array
-
-    @staticmethod
-    @lru_cache(maxsize=256)
-    def alone(hand: SettledHand) -> HandBatch:
-        """Return the arrays of one settled hand; those of the last 256 hands are kept."""
-        return HandBatch.of((hand,))
 
     @classmethod
     def of(cls, hands: Sequence[SettledHand]) -> HandBatch:
         """Collect the arrays of settled hands, one hand after another."""
-        tiles = tuple([hand.tiles for hand in hands])
+        tiles = [hand.tiles for hand in hands]
         positions = [hand.positions for hand in hands]
         angles = concatenated([hand.postures.angles for hand in hands])
         points = np.concatenate([*positions, [hand.palm.centre for hand in hands]])
@@ -238,20 +236,22 @@ class HandBatch:
         engagement = concatenated([hand.engagement for hand in hands])
         bends = angles.copy()
         bends[:, 1:] -= angles[:, :-1]
+        places = tile_index_of([len(own) for own in tiles])
         # plans show them
         points.setflags(write=False)
         axes.setflags(write=False)
         engagement.setflags(write=False)
         return cls(
             tuple(hands),
-            tile_index_of(tuple(map(len, tiles))),
-            contact_pattern_of(tiles),
+            places,
+            contact_pattern_of(tiles, places),
             points,
             axes,
             engagement,
             concatenated([hand.lateral_shares for hand in hands]),
             angles,
             bends,
+            np.array([hand.surface.friction for hand in hands])[places.hand],
             _palm_limits(hands),
         )
 
@@ -268,33 +268,28 @@ class HandBatch:
         return HandBatch(
             tuple(hands),
             self.places,
-            contact_pattern_of(tuple([hand.tiles for hand in hands])),
+            contact_pattern_of([hand.tiles for hand in hands], self.places),
             self.points,
             self.axes,
             engagement,
             concatenated([hand.lateral_shares for hand in hands]),
             self.angles,
             self.bends,
+            self.friction,
             _palm_limits(hands),
         )
 
-    @cached_property
+    @property
     def closing_tensions(self) -> tuple[float, ...]:
         """Closing tension of each hand [N]."""
         return tuple([hand.closing_tension for hand in self.hands])
 
-    @cached_property
-    def friction(self) -> Array:
-        """Friction coefficient of each tile's surface, shape (T,)."""
-        each = np.array([hand.surface.friction for hand in self.hands])
-        return each[self.places.hand]
-
-    @cached_property
+    @property
     def stops(self) -> NDArray[np.int8]:
         """Mechanical stop that each finger joint is at, as codes of `JOINT_STOPS`, shape (F, 3)."""
         return concatenated([hand.postures.stops for hand in self.hands])
 
-    @cached_property
+    @property
     def bearing_shares(self) -> Array:
         """Share of what balances its joint that each contact bears, shape (F, 3)."""
         return concatenated([hand.postures.bearing_shares for hand in self.hands])

@@ -104,7 +104,8 @@ def _layout_of(
     limits : tuple of int
         Limit rows of each tile, of which a hand has the first, tile by tile.
     """
-    places, touch = tile_index_of(tuple(map(len, tiles))), contact_pattern_of(tiles)
+    places = tile_index_of([len(own) for own in tiles])
+    touch = contact_pattern_of(tiles, places)
     named = [(h, name) for h, own in enumerate(columns) for name in own]
     place = {name: i for i, name in enumerate(named, start=1)}
     # every column that a hand with a fixed wrist may have
@@ -350,7 +351,7 @@ def recover_floating_hand(
     rows, of_tiles = space.utilisations(y), layout_of(settled, sticking=False).plane_tiles
     used = np.zeros(len(loads))
     np.maximum.at(used, of_tiles, rows[: len(of_tiles)])
-    known, drive = HandBatch.alone(settled), settled.hand.drive
+    known, drive = HandBatch.of((settled,)), settled.hand.drive
     # the winch stands still from there on
     at_rest = settled.loads[:, 0, 0] + settled.loads[:, 0, 1] * closed[settled.finger_of]
     drawn = np.add.reduceat(at_rest, known.places.first_of_finger)

@@ -170,7 +170,7 @@ def _hand(prepared: PreparedStance, solution: Solution, index: int) -> HandPlan:
     space, wrist = solution.sets.spaces[index], prepared.hands.wrists[index]
     pose = solution.poses[index]
     if wrist is None or pose is None:
-        alone, own = HandBatch.alone(settled), (space,)
+        alone, own = HandBatch.of((settled,)), (space,)
         arrays, _, _ = LoadRecovery(alone, own).read((solution.loads[index],))
         return arrays.hands((limb,), alone, own)[0]
     stiffness, y = prepared.question.stance.limb_stiffness, solution.loads[index]

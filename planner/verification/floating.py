@@ -264,7 +264,7 @@ def _resting(hands: tuple[SettledHand, ...], driven: tuple[bool | None, ...]) ->
         give = _lateral_compliance(hand, frame, own[held], hand.positions[own[held]])
         compliance[k][np.ix_(held, held)] = give
     counts = np.array(list(map(len, owns)))[:, None]
-    settled = [hand.fingers[i].contacts for hand, i in each]
+    settled = [finger.contacts for h in giving for finger in hands[h].fingers]
     angles = np.array([[contact.angle for contact in of_finger] for of_finger in settled])
     tilts = np.array([[contact.tilt for contact in of_finger] for of_finger in settled])
     springs = np.array(model.joint_stiffness) * np.diff(angles, prepend=0.0, axis=1)

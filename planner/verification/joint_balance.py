@@ -129,8 +129,9 @@ class JointBalance(ResidualLimits):
         if len(touch.touching) < len(places.hand):
             self._bears = touch.contacts[places.phalanges] != CONTACT_CODES["none"]
             alone = ~self._bears.any(axis=1, keepdims=True)
-            self.held = (known.stops > 0) | alone
-            sides = STOP_SIGNS[known.stops] * ~alone
+            stops = known.stops
+            self.held = (stops > 0) | alone
+            sides = STOP_SIGNS[stops] * ~alone
             self.stop_fingers, self.stop_joints = sides.nonzero()
             self._sides = sides[self.stop_fingers, self.stop_joints]
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import cmath
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -180,12 +179,12 @@ class RestingContact(NamedTuple):
         return sign * (path - self.gap * turn)
 
 
-@lru_cache(maxsize=256)  # the fingers of as many hands as the check keeps stances
 def finger_contacts(
     hand: SettledHand, index: int
 ) -> tuple[tuple[TileFace, ...], tuple[RestingContact | None, ...]]:
     """Return the faces of a finger's tiles, and their contacts with the rock."""
-    settled, model = hand.fingers[index], hand.fingers[index].model
+    settled = hand.fingers[index]
+    model = settled.model
     own = np.flatnonzero(hand.finger_of == index)
     section = hand.hand.section(FINGERS[index], hand.hold, hand.grasp, hand.seating.pose)
     depths = model.depths(len(own) > len(PHALANGES)) * hand.closing_tension

@@ -48,8 +48,8 @@ class SlippedTiles(ResidualLimits):
         self._found = len(tiles) == len({*lost})
         self._friction = known.friction[self._tiles]
         if closed is None:
-            as_closed = tuple([hand.as_closed.tiles for hand in known.hands])
-            closed = contact_pattern_of(as_closed).contacts
+            as_closed = [hand.as_closed.tiles for hand in known.hands]
+            closed = contact_pattern_of(as_closed, known.places).contacts
         self._closed = closed
 
     def recompute(self, again: Recomputed) -> list[Residual]:
