@@ -71,11 +71,13 @@ def _largest_change(
 ) -> tuple[float, str]:
     """Return how far phalanges are from those of a hand that closed there [rad], and the finger."""
     worst, where = 0.0, FINGERS[0]
-    for i, frame in enumerate(settled.hand.frames(settled.grasp.outer_rotation)):
+    frames = settled.hand.frames(settled.grasp.outer_rotation)
+    fingers = zip(frames, settled.fingers, again.fingers, strict=True)
+    for i, (frame, one, other) in enumerate(fingers):
         tiles = np.flatnonzero(settled.finger_of == i)[-len(PHALANGES) :]
         # from x toward z is against the sense of the axis across, z × x
         turned = -float(twist[3:] @ frame.across)
-        pairs = zip(tiles, settled.fingers[i].contacts, again.fingers[i].contacts, strict=True)
+        pairs = zip(tiles, one.contacts, other.contacts, strict=True)
         for tile, before, after in pairs:
             drag = hand.axes[tile, 0]
             along = complex(-drag @ frame.along, -drag[2]) * cmath.rect(1.0, -before.tilt)

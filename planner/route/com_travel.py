@@ -18,7 +18,6 @@ with the largest distance l_j of the point from joint j, and prismatic joints s 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -53,7 +52,6 @@ class _Levers(NamedTuple):
     slides: Array
 
 
-@lru_cache(maxsize=32)
 def _levers(robot: Robot) -> dict[str, _Levers]:
     """Return the levers of each limb of a robot."""
     model, found = robot.model, {}
@@ -107,18 +105,20 @@ def mass_travel(
         limb: np.array([angle, *np.abs(robot.chains[limb].coupling) @ np.abs(end[limb] - at)])
         for limb, at in start.items()
     }
+    levers = _levers(robot)
     own = robot.mass if load.mass is None else load.mass
     if load.com is not None:
         whole = own * float(np.linalg.norm(load.com)) * angle**2
     else:
-        whole = own * _com_acceleration(robot, turn, start, end, rates)
+        whole = own * _com_acceleration(robot, levers, turn, start, end, rates)
     for payload in load.payloads:
-        whole += payload.mass * _of_payload(robot, payload, angle, rates)
+        whole += payload.mass * _of_payload(robot, levers, payload, angle, rates)
     return whole / 8.0
 
 
 def _com_acceleration(
     robot: Robot,
+    levers: Mapping[str, _Levers],
     turn: Array,
     start: Mapping[str, Array],
     end: Mapping[str, Array],
@@ -141,18 +141,23 @@ def _com_acceleration(
     body = model.inertias[1]
     centre = float(np.linalg.norm(robot.root.inverse().apply(np.array(body.lever))))
     third = float(body.mass) * centre * float(np.linalg.norm(turn)) ** 3
-    for limb, levers in _levers(robot).items():
-        for k, (mass, out) in enumerate(zip(levers.masses, levers.centres, strict=True)):
-            third += mass * _derivative(levers, rates[limb], k + 1, out, 3)
+    for limb, each in levers.items():
+        for k, (mass, out) in enumerate(zip(each.masses, each.centres, strict=True)):
+            third += mass * _derivative(each, rates[limb], k + 1, out, 3)
     return most + 0.25 * third / robot.mass
 
 
-def _of_payload(robot: Robot, payload: Payload, turn: float, rates: Mapping[str, Array]) -> float:
+def _of_payload(
+    robot: Robot,
+    levers: Mapping[str, _Levers],
+    payload: Payload,
+    turn: float,
+    rates: Mapping[str, Array],
+) -> float:
     """Return the bound of a payload's second derivative, wherever on its limb it is [m]."""
     out = float(np.linalg.norm(payload.com))
     if payload.link == robot.description.body:
         return out * turn**2
-    levers = _levers(robot)
     own = [payload.limb] if payload.limb is not None else list(levers)
     return max(
         _derivative(each, rates[limb], len(each.masses), out + float(each.spans[-1]), 2)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -117,6 +116,8 @@ class Cascade:
         T + H, the number of tiles and palms.
     used : ndarray, shape (T + H,)
         Utilisation of each tile's strength and each palm's in shear in the plan.
+    fingers : FingerStates
+        States of the fingers at the plan's tensions.
     """
 
     def __init__(
@@ -166,17 +167,12 @@ class Cascade:
         self._loads, self._gone = loads, gone
         off = gone[: len(self._phalanx)]
         self._on = (self._batch.touch.touches > 0.0) & ~off
-        self.__dict__.pop("fingers", None)
+        self.fingers = FingerStates.of(self._batch, loads.tiles, off)
         # of the hands on the rock, in B, moments over 0.1 m
         of_tiles = np.einsum("tk,tki->i", loads.tiles, self._per_load)
         self._wrench = of_tiles + loads.palms.ravel() @ self._per_palm
         none = np.zeros((1, len(loads.palms)), bool)
         self.used = self._used(loads.tiles[None], loads.palms[None], self._on[None], none)[0]
-
-    @cached_property
-    def fingers(self) -> FingerStates:
-        """States of the fingers at the plan's tensions."""
-        return FingerStates.of(self._batch, self._loads.tiles, self._gone[: len(self._phalanx)])
 
     def replanned(self, loads: Loads, slipped: Flags) -> Cascade:
         """Return the tables of another plan of the same stance, made after slips.
