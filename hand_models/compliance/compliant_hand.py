@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +21,7 @@ from hand_models.compliance.compliant_finger import CompliantFingers, FingerAtRe
 from hand_models.compliance.grasp import complex_steps, slopes
 from hand_models.compliance.hand_springs import PalmSprings, lateral_stiffness
 from hand_models.compliance.link import Numbers, across
-from hand_models.finger import PHALANGES
+from hand_models.finger import PHALANGES, SettledFinger
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.tendon import FingerTendon, MotorScheme
 
@@ -104,20 +103,17 @@ class CompliantHand:
         self.preload = _preload(preload, settled)
         self.frames = hand.frames(settled.grasp.outer_rotation)
         self.scheme: MotorScheme = scheme
-        self.fingers = [self._finger(i, name) for i, name in enumerate(FINGERS)]
+        self.fingers = [self._finger(i, each) for i, each in enumerate(settled.fingers)]
         self._own = [np.flatnonzero(settled.finger_of == i) for i in range(len(FINGERS))]
+        self._batch = CompliantHands([self])
 
-    @cached_property
-    def _batch(self) -> CompliantHands:
-        return CompliantHands([self])
-
-    def _finger(self, i: int, name: str) -> FingerAtRest:
-        settled, hand = self.settled, self.settled.hand
+    def _finger(self, i: int, finger: SettledFinger) -> FingerAtRest:
+        settled, hand, name = self.settled, self.settled.hand, FINGERS[i]
         base_tile = name.startswith("outer")
         own = settled.finger_of == i
         tendon = FingerTendon.from_table(hand.table, base_tile, settled.stiffness_ratio)
         return FingerAtRest(
-            settled.fingers[i],
+            finger,
             hand.section(name, settled.hold, settled.grasp, settled.seating.pose),
             replace(
                 tendon.engaged(settled.engagement[own]),
@@ -188,7 +184,7 @@ class CompliantHand:
         k: joints of `SettledHand.stops`. A torque is positive where it pushes against the stop.
         """
         stops = [(i, j) for i, j, _ in self.settled.stops]
-        upper = [self.settled.fingers[i].contacts[j].stop == "upper" for i, j in stops]
+        upper = [self.fingers[i].finger.contacts[j].stop == "upper" for i, j in stops]
         own = [len(PHALANGES) * i + j for i, j in stops]
         return np.asarray(torques[:, own] * np.where(upper, 1.0, -1.0))
 

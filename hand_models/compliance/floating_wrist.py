@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar, Final, Literal, Self
 
 import numpy as np
@@ -184,12 +183,6 @@ class FloatingWrist(CompliantGrasp):
         """
         return self.hand.loads(y)
 
-    @cached_property
-    def _contact_stiffness(self) -> Array:
-        """Contact stiffness of each tile, zero off the rock, shape (n,) [N/m]."""
-        fingers = self.hand.fingers
-        return np.concatenate([finger.anchored.contact_stiffness for finger in fingers])
-
     def stretches(self, shears: Array) -> Array:
         """Return how far tiles are stretched along the rock: shear over contact stiffness [m].
 
@@ -203,7 +196,8 @@ class FloatingWrist(CompliantGrasp):
         ndarray, shape (n,)
             Zero for tiles off the rock.
         """
-        stiffness = self._contact_stiffness
+        fingers = self.hand.fingers
+        stiffness = np.concatenate([finger.anchored.contact_stiffness for finger in fingers])
         held, found = stiffness > 0.0, np.zeros(len(stiffness))
         found[held] = np.abs(shears[held]) / stiffness[held]
         return found

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -227,12 +226,12 @@ class SettledHand:
         """The hand before any of its tiles slipped."""
         return self if self.closed is None else self.closed
 
-    @cached_property
+    @property
     def fingers(self) -> tuple[SettledFinger, ...]:
         """Posture of each finger, in the order of `FINGERS`."""
         return self.postures.fingers(self.hand.finger)
 
-    @cached_property
+    @property
     def closures(self) -> tuple[str, ...]:
         """Closure of each finger, in the order of `FINGERS`.
 
@@ -260,7 +259,7 @@ class SettledHand:
         """True for tiles that are on rock (contact ``face`` or ``edge``), shape (n,)."""
         return np.array([tile.contact in ("face", "edge") for tile in self.tiles])
 
-    @cached_property
+    @property
     def lateral_shares(self) -> Array:
         """Share of its finger's lateral reaction that each tile carries, shape (n,).
 
@@ -269,7 +268,7 @@ class SettledHand:
         sums = self._whole_tiles
         return np.asarray(self.engagement / np.where(sums > 0.0, sums, 1.0)[self.finger_of])
 
-    @cached_property
+    @property
     def limit_shares(self) -> Array:
         """Share of a whole tile's strength that limits each tile's load, shape (n,).
 
@@ -307,7 +306,7 @@ class SettledHand:
         """
         return 1.0 if self.surface.name == FITTED_SURFACE else self.hand.rock_stiffness_ratio
 
-    @cached_property
+    @property
     def palm_shear_stiffness(self) -> float:
         """Stiffness of the palm's shear toward −x [N/m].
 

@@ -105,8 +105,7 @@ def closing_sequence(settled: SettledHand) -> tuple[ClosingSequence, ...]:
     hand = settled.hand
     nail = hand.nail
     sequence = []
-    for i, name in enumerate(FINGERS):
-        finger = settled.fingers[i]
+    for i, (name, finger) in enumerate(zip(FINGERS, settled.fingers, strict=True)):
         model = finger.model
         turned = nail.preload + nail.stiffness * float(settled.nail_angles[i])
         stages = [

@@ -6,7 +6,6 @@ For palms: which tiles are engaged, and the strength of these together.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -150,27 +149,25 @@ def _each_hand(unordered: Array, *, nails: bool) -> list[HandTiles]:
     numbers.setflags(write=False)
     column = TILE_COLUMNS
     kinds = numbers[..., column.kind].astype(np.int8)
-    codes = kinds.tobytes()
+    codes = [kinds[i].tobytes() for i in range(count)]
+    names = [TILE_NAMES[i] for i in order.tolist()]
+    named = {
+        of_hand: tuple(
+            SettledTile(finger, part, CONTACT_NAMES[kind])
+            for (finger, part), kind in zip(names, of_hand, strict=True)
+        )
+        for of_hand in dict.fromkeys(codes)
+    }
     axes = numbers[..., column.axes].reshape(count, tiles, 3, 3)
     loads = numbers[..., column.shear.start : column.normal.stop].reshape(count, tiles, 2, 2)
     return [
-        HandTiles(_named(codes[i : i + tiles], nails), finger_of, *of_hand)
-        for i, *of_hand in zip(
-            range(0, count * tiles, tiles),
+        HandTiles(named[own], finger_of, *of_hand)
+        for own, *of_hand in zip(
+            codes,
             *(numbers[..., column.position], axes, loads, numbers[..., column.engagement]),
             strict=True,
         )
     ]
-
-
-@lru_cache(maxsize=4096)
-def _named(kinds: bytes, nails: bool) -> tuple[SettledTile, ...]:
-    """Return tiles from the codes of their contacts."""
-    names = [TILE_NAMES[i] for i in _order(nails=nails)[0].tolist()]
-    return tuple(
-        SettledTile(finger, part, CONTACT_NAMES[kind])
-        for (finger, part), kind in zip(names, kinds, strict=True)
-    )
 
 
 def palms_on_rock(placed: PlacedHands, gaps: Array) -> list[SettledPalm]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -145,7 +144,6 @@ def _cross_products(vectors: Array, choices: Indices) -> Array:
     return np.vstack(found)
 
 
-@lru_cache(maxsize=16)
 def _choices(
     shapes: tuple[tuple[int, int], ...], r: int
 ) -> tuple[Indices, NDArray[np.bool_], Indices]:

@@ -14,6 +14,7 @@ are divided by 0.1 m (`WRENCH_SCALE`), so that all six components are newtons.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, NamedTuple
@@ -179,29 +180,51 @@ class WrenchSpace:
         """True if the blocks of coupled columns have few enough rows to list their vertices."""
         return self._most_rows <= SETTINGS.most_rows
 
-    @property
-    def _enough(self) -> tuple[Array, Array]:
-        """Rows that are enough for the set at u = 1, as `A` and `b`."""
+    def _enough(self, blocks: Sequence[Block]) -> tuple[Array, Array]:
+        """Return rows that are enough for the set at u = 1, as `A` and `b`."""
         if not self.listed:
             return self.A, self.b
         wide = len(self.s) - len(self.D), len(self.s)
         A, b = [self.L[slice(*wide)]], [self.b[slice(*wide)]]
-        for block in self._sum.blocks:
+        for block in blocks:
             A.append(np.zeros((len(block.b), len(self.columns))))
             A[-1][:, block.columns] = block.A
             b.append(block.b)
         return np.vstack(A), np.concatenate(b)
 
     @cached_property
-    def _sum(self) -> BlockSum:
-        """The sum of the blocks, without wrench rows."""
+    def _sum_and_cuts(self) -> tuple[BlockSum, Indices]:
+        """The sum of the blocks, and the wrench rows beyond which it reaches."""
         blocks = []
         for columns, A, b in self._coupled:
             vertices, facets = polytope(A, b)
             if not len(vertices):
                 raise self._empty(columns)
             blocks.append(Block(columns, vertices, A[facets], b[facets]))
-        return BlockSum(self.origin, self.generators, blocks)
+        whole = BlockSum(self.origin, self.generators, blocks)
+        slopes = self.D @ self.generators
+        reach = self.D @ self.origin
+        for columns, vertices, *_ in whole.blocks:
+            reach = reach + (slopes[:, columns] @ vertices.T).max(axis=1)
+        cuts: Indices = np.flatnonzero(reach > self._held * (1.0 + SETTINGS.tolerance))
+        # where the sum reaches least far along the cuts is most often a wrench of the set
+        within = not len(cuts) or self._obeys(whole.extreme(-slopes[cuts].sum(axis=0)))
+        if not within and self._farthest(np.zeros(6), whole.blocks) is None:
+            row = self.rows[len(self.s) - len(self.D) + cuts[0]]
+            raise EmptySetError(
+                f"the wrench space is empty at utilisation 1: every wrench exceeds {row.limit}"
+            )
+        return whole, cuts
+
+    @property
+    def _sum(self) -> BlockSum:
+        """The sum of the blocks, without wrench rows."""
+        return self._sum_and_cuts[0]
+
+    @property
+    def _cuts(self) -> Indices:
+        """Wrench rows beyond which the sum of the blocks reaches."""
+        return self._sum_and_cuts[1]
 
     def _empty(self, columns: Indices | None = None) -> EmptySetError:
         names = "" if columns is None else " of " + ", ".join(self.columns[i] for i in columns)
@@ -213,25 +236,7 @@ class WrenchSpace:
     @property
     def dimension(self) -> int:
         """Dimension of the set's affine hull at u = 1, from 0 to 6; raises `EmptySetError`."""
-        _ = self._cuts  # an empty set has none
         return len(self._sum.axes[1])
-
-    @cached_property
-    def _cuts(self) -> Indices:
-        """Wrench rows beyond which the sum of the blocks reaches."""
-        slopes = self.D @ self.generators
-        reach = self.D @ self.origin
-        for columns, vertices, *_ in self._sum.blocks:
-            reach = reach + (slopes[:, columns] @ vertices.T).max(axis=1)
-        cuts: Indices = np.flatnonzero(reach > self._held * (1.0 + SETTINGS.tolerance))
-        # where the sum reaches least far along the cuts is most often a wrench of the set
-        within = not len(cuts) or self._obeys(self._sum.extreme(-slopes[cuts].sum(axis=0)))
-        if not within and self._farthest(np.zeros(6)) is None:
-            row = self.rows[len(self.s) - len(self.D) + cuts[0]]
-            raise EmptySetError(
-                f"the wrench space is empty at utilisation 1: every wrench exceeds {row.limit}"
-            )
-        return cuts
 
     def _obeys(self, y: Array) -> bool:
         """Return True if loads of the sum of the blocks also keep to the wrench rows."""
@@ -242,10 +247,10 @@ class WrenchSpace:
         """Capacities of the wrench rows, shape (nd,)."""
         return self.s[len(self.s) - len(self.D) :]
 
-    def _farthest(self, direction: Array) -> Array | None:
+    def _farthest(self, direction: Array, blocks: Sequence[Block]) -> Array | None:
         """Return the wrench farthest along d over all rows at u = 1, by linear programming."""
         cost = -(self.generators.T @ direction)
-        y = linear_program(cost, *self._enough, "support", tolerance=BASE_TOLERANCES.force)
+        y = linear_program(cost, *self._enough(blocks), "support", tolerance=BASE_TOLERANCES.force)
         return None if y is None else self.wrench(y)
 
     @cached_property
@@ -263,11 +268,6 @@ class WrenchSpace:
         if found is None:
             raise self._empty()
         return found
-
-    @property
-    def _facets(self) -> Facets:
-        """Facets in the coordinates of `BlockSum.axes`, about `BlockSum.base`."""
-        return self._clipped[1] if len(self._cuts) else self._sum.facets
 
     def sizes(self) -> Sizes:
         """Return how many candidates `vertices` and `half_spaces` examine, at far less cost.
@@ -297,7 +297,8 @@ class WrenchSpace:
         LimitError
             If there are too many candidate vertices (see `sizes`), or rounding hides their edges.
         """
-        scaled = lifted(self._facets, *self._sum.axes, self._sum.base)
+        facets = self._clipped[1] if len(self._cuts) else self._sum.facets
+        scaled = lifted(facets, *self._sum.axes, self._sum.base)
         return scaled._replace(
             normals=scaled.normals * WRENCH_SCALE,
             equation_normals=scaled.equation_normals * WRENCH_SCALE,
@@ -332,7 +333,7 @@ class WrenchSpace:
             y = self._sum.extreme(self.generators.T @ d)
             if not len(self._cuts) or self._obeys(y):
                 return self.wrench(y)
-        found = self._farthest(d)
+        found = self._farthest(d, self._sum.blocks if self.listed else ())
         if found is None:
             raise self._empty()
         return found
