@@ -103,6 +103,27 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture
+def alone():
+    """A zenoh session that is its own whole network."""
+    from tests.suite.helpers.served import lonely_session
+
+    with lonely_session() as opened:
+        yield opened
+
+
+@pytest.fixture(scope="session")
+def rock(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """File of a scan: half a metre of a rough wall."""
+    import trimesh
+
+    from tests.suite.helpers.rocks import fractal_wall
+
+    path = tmp_path_factory.mktemp("rock") / "wall.ply"
+    trimesh.Trimesh(*fractal_wall(3, size=0.5, count=101), process=False).export(path)
+    return path
+
+
+@pytest.fixture
 def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
     """Close hands at 8 places about their own instead of 128 where "robust" is asked for."""
     from hand_models.fixed_wrist import ScatterSettings, robustness

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tests.suite.helpers.requests import dotted
+
 __all__ = ["MISSING", "Difference", "differences", "kind_of", "scales", "worst"]
 
 KINDS = {
@@ -92,22 +94,22 @@ def _apart(expected: Any, got: Any, path: Path, scales: dict[str, float]) -> Ite
                 yield from _apart(expected[key], got[key], (*path, key), scales)
             else:
                 pair = expected.get(key, MISSING), got.get(key, MISSING)
-                yield Difference(_dotted((*path, key)), *pair, math.inf)
+                yield Difference(dotted((*path, key)), *pair, math.inf)
     elif isinstance(expected, list) and isinstance(got, list):
         if path and path[-1] in SETS:
             yield from _unmatched(expected, got, path, scales, "got")
             yield from _unmatched(got, expected, path, scales, "expected")
         elif len(expected) != len(got):
-            yield Difference(_dotted(path) + ".length", len(expected), len(got), math.inf)
+            yield Difference(dotted(path) + ".length", len(expected), len(got), math.inf)
         else:
             for i, pair in enumerate(zip(expected, got, strict=True)):
                 yield from _apart(*pair, (*path, i), scales)
     elif _is_number(expected) and _is_number(got):
         if expected != got:
             size = abs(expected - got) / scales[kind_of(path)]
-            yield Difference(_dotted(path), expected, got, size)
+            yield Difference(dotted(path), expected, got, size)
     elif type(expected) is not type(got) or expected != got:
-        yield Difference(_dotted(path), expected, got, math.inf)
+        yield Difference(dotted(path), expected, got, math.inf)
 
 
 def _unmatched(
@@ -124,7 +126,7 @@ def _unmatched(
         size = float(min(near, default=math.inf))
         if size > 0.0:
             pair = (row, f"no such row in what was {where}")
-            yield Difference(_dotted((*path, i)), *(pair if where == "got" else pair[::-1]), size)
+            yield Difference(dotted((*path, i)), *(pair if where == "got" else pair[::-1]), size)
 
 
 def _split(row: Any, path: Path, scales: dict[str, float]) -> tuple[tuple[Any, ...], np.ndarray]:
@@ -156,8 +158,3 @@ def kind_of(path: Path) -> str:
     """Return the name that a number at a path is measured by."""
     name = next((str(step) for step in reversed(path) if isinstance(step, str)), "")
     return KINDS.get(name, name)
-
-
-def _dotted(path: Path) -> str:
-    text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
-    return text.removeprefix(".")

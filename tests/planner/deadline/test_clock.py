@@ -232,24 +232,21 @@ def test_the_load_factor_is_left_out(monkeypatch, clock):
     assert told(answer) == f"the deadline of {LONG:g} s expired before the load factor was found"
 
 
-def test_the_robust_load_factor_is_left_out_and_nothing_else(monkeypatch, clock, few_places):
+@pytest.mark.parametrize(
+    ("extra", "before"),
+    [
+        ("robust", "the load factor was found at all places of the hands"),
+        ("spread", "a plan was found in all draws of the numbers"),
+    ],
+)
+def test_an_extra_is_left_out_and_nothing_else(monkeypatch, clock, few_places, extra, before):
     late_at(monkeypatch, clock, programs, "load_factor", 3)
-    answer = late(ask(on_wall(), "load_factor", "robust"))
-    assert answer.unfinished == ("robust",)
-    assert answer.robust is None
+    answer = late(ask(on_wall(), "load_factor", extra))
+    assert answer.unfinished == (extra,)
+    assert getattr(answer, extra) is None
     assert answer.load_factor is not None
     assert answer.status == "optimal"
-    assert told(answer).endswith("before the load factor was found at all places of the hands")
-
-
-def test_the_spread_is_left_out_and_nothing_else(monkeypatch, clock):
-    late_at(monkeypatch, clock, programs, "load_factor", 3)
-    answer = late(ask(on_wall(), "load_factor", "spread"))
-    assert answer.unfinished == ("spread",)
-    assert answer.spread is None
-    assert answer.load_factor is not None
-    assert answer.status == "optimal"
-    assert told(answer).endswith("before a plan was found in all draws of the numbers")
+    assert told(answer).endswith(f"before {before}")
 
 
 def test_a_plan_that_is_not_proven_the_least_is_told_as_such(monkeypatch, clock):

@@ -20,7 +20,7 @@ from planner.solving import plan
 from service.answering import handle, questions
 from service.commands.stances import read_request
 from service.requests import PlanRequest, WrenchSpaceRequest
-from service.serving import CruxClient, PlanService, open_session, zenoh_config
+from service.serving import CruxClient, PlanService
 from service.wire import decode_request
 from tests.suite.helpers.checks import problems
 from tests.suite.helpers.floating_hands import NEAR, PAIR, REAR, body_wrench, floating, wrist_of
@@ -270,14 +270,11 @@ def test_no_plan_is_dressed_up():
 
 
 @pytest.mark.slow
-def test_reply_over_zenoh_tells_the_wrists():
+def test_reply_over_zenoh_tells_the_wrists(alone):
     bundled, light = read_request("wall-300-floating"), Load(mass=95.0)
     request = msgspec.structs.replace(bundled, load=light, want=["model"])
-    with (
-        open_session(zenoh_config(settings=["listen/endpoints:[]"], multicast=False)) as session,
-        PlanService(session, workers=1),
-    ):
-        reply = CruxClient(session, timeout=PATIENCE).plan(request)
+    with PlanService(alone, workers=1):
+        reply = CruxClient(alone, timeout=PATIENCE).plan(request)
     assert reply.status == "optimal"
     assert [hand.wrist.mode for hand in reply.hands] == ["fixed", "floating", "floating", "fixed"]
     for hand in reply.hands:

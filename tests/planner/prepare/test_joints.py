@@ -13,7 +13,6 @@ from hand_models.rock import Plane
 from hand_models.tile import Surface
 from planner.prepare import posture
 from planner.question import EARTH_GRAVITY, Limits, Load, Question
-from planner.result import Plan
 from planner.robots import LinkTree, RobotFile, robosimian, robot_of
 from planner.solving import plan
 from tests.suite.helpers.robots import TWO_LINK, limbs_toml
@@ -31,10 +30,6 @@ ANGLES = st.tuples(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5))
 
 def solved(**kwargs) -> Question:
     return Question(replace(on_wall(), joints="solve"), **kwargs)
-
-
-def largest_torque(answer: Plan) -> float:
-    return max(float(np.abs(torques).max()) for torques in answer.joint_torque.values())
 
 
 # --- signs, by hand

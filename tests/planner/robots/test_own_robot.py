@@ -21,7 +21,7 @@ from service.answering import dispatch, read_hand, read_robot, robots_of, with_h
 from service.answering.questions import question
 from service.commands.cli import run_command_line
 from service.requests import PlanRequest, WrenchSpaceRequest
-from service.serving import PlanService, open_session, zenoh_config
+from service.serving import PlanService
 from service.wire import NoServiceError, ServiceError, decode_request, server_key, service_key
 from tests.suite.helpers.commands import complaint, result
 from tests.suite.helpers.hands import entry_toml
@@ -284,12 +284,6 @@ def test_a_route_is_climbed_by_the_robot_in_other_processes_too(
 
 
 # Zenoh --------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def alone() -> Iterator[zenoh.Session]:
-    with open_session(zenoh_config(settings=["listen/endpoints:[]"], multicast=False)) as opened:
-        yield opened
 
 
 @pytest.mark.slow

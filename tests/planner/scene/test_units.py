@@ -89,8 +89,6 @@ def present(value):
     return lambda asked: replace(asked, present={"front_left": np.full(4, value)})
 
 
-CAPS = {"front_left": 0.3}
-
 WRONG = {
     "body wrench in kN": (wrench(1e-3), "body_wrench"),
     "body wrench in kgf": (wrench(1.0 / 9.80665), "body_wrench"),

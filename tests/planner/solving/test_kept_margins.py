@@ -7,26 +7,16 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from msgspec import structs
 
 from hand_models.base import InvalidInputError
 from planner import Limits, Plan, Question, plan
 from planner.prepare import prepare_stance
 from planner.result import Finding
 from planner.streaming import WrenchStream
-from service.answering import question
-from service.commands.stances import read_request
-from tests.suite.helpers.stances import random_question
+from tests.suite.helpers.stances import limited, random_question
 
 COST = 0.1
 """Part of the least utilisation that margins may cost."""
-
-
-def asked(name: str, wrist: str = "fixed", **limits: object) -> Question:
-    request = read_request(name)
-    hands = [structs.replace(hand, wrist=wrist) for hand in request.stance.hands]
-    stance = structs.replace(request.stance, hands=hands)
-    return question(structs.replace(request, stance=stance, limits=Limits(**limits)))
 
 
 def if_possible(question: Question, **limits: float) -> Question:
@@ -43,7 +33,8 @@ def tensions(answer: Plan) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["wall-300", "overhang", "ledge"])
 def test_margins_that_cost_little_are_kept_as_if_required(name: str) -> None:
-    answer, required = plan(asked(name, margins="if_possible")), plan(asked(name, hold_margin=2.0))
+    answer = plan(limited(name, margins="if_possible"))
+    required = plan(limited(name, hold_margin=2.0))
     assert (answer.margin_share, required.margin_share) == (1.0, None)
     assert answer.utilisation == pytest.approx(required.utilisation, abs=1e-9)
     assert tensions(answer) == pytest.approx(tensions(required), abs=1e-6)
@@ -59,15 +50,15 @@ def test_required_margins_are_zero_unless_they_are_given() -> None:
 
 
 def test_a_share_is_what_the_cap_leaves_and_the_same_margins_required_take_all_of_it() -> None:
-    answer = plan(asked("wall-300", margins="if_possible", hold_margin=5.0))
+    answer = plan(limited("wall-300", margins="if_possible", hold_margin=5.0))
     assert answer.status == "optimal"
     assert answer.utilisation == pytest.approx(1.0, abs=2e-6)
     share = answer.margin_share
     assert share is not None
     assert 0.0 < share < 1.0
-    kept = plan(asked("wall-300", hold_margin=5.0 * share))
+    kept = plan(limited("wall-300", hold_margin=5.0 * share))
     assert kept.utilisation == pytest.approx(answer.utilisation, abs=1e-7)
-    more = plan(asked("wall-300", hold_margin=5.0 * (share + 1e-3)))
+    more = plan(limited("wall-300", hold_margin=5.0 * (share + 1e-3)))
     assert more.status == "overloaded"
     (finding,) = found(answer)
     assert (finding.field, finding.value) == ("limits.margins", share)
@@ -76,8 +67,8 @@ def test_a_share_is_what_the_cap_leaves_and_the_same_margins_required_take_all_o
 
 
 def test_of_twice_the_margin_half_the_share_is_kept() -> None:
-    once = plan(asked("wall-300", margins="if_possible", hold_margin=5.0)).margin_share
-    twice = plan(asked("wall-300", margins="if_possible", hold_margin=10.0)).margin_share
+    once = plan(limited("wall-300", margins="if_possible", hold_margin=5.0)).margin_share
+    twice = plan(limited("wall-300", margins="if_possible", hold_margin=10.0)).margin_share
     assert once is not None
     assert twice == pytest.approx(0.5 * once, abs=2e-6)
 
@@ -101,7 +92,7 @@ def test_a_share_costs_a_tenth_at_most_and_no_status(seed: int) -> None:
 
 @pytest.mark.parametrize("name", ["wall-300", "ledge", "slab"])
 def test_shares_and_tensions_change_as_little_as_the_load(name: str) -> None:
-    bare = asked(name, margins="if_possible", hold_margin=5.0)
+    bare = limited(name, margins="if_possible", hold_margin=5.0)
     wrench = bare.needed_wrench()
     # through the loads at which the least utilisation reaches the cap, and beyond
     least = plan(replace(bare, limits=Limits())).utilisation
@@ -116,13 +107,13 @@ def test_shares_and_tensions_change_as_little_as_the_load(name: str) -> None:
 
 
 def test_what_overloads_without_margins_keeps_those_that_cost_nothing() -> None:
-    bare, answer = plan(asked("boulders")), plan(asked("boulders", margins="if_possible"))
+    bare, answer = plan(limited("boulders")), plan(limited("boulders", margins="if_possible"))
     assert answer.status == bare.status == "overloaded"
     assert answer.utilisation == pytest.approx(bare.utilisation, abs=2e-6)
     assert answer.margin_share == pytest.approx(0.0, abs=0.01)
     (finding,) = found(answer)
     assert finding.message.endswith("keeps nothing: any of it would add to the overload")
-    heavy = asked("ledge", margins="if_possible")
+    heavy = limited("ledge", margins="if_possible")
     heavy = replace(heavy, body_wrench=1.2 * heavy.needed_wrench())
     free = plan(heavy)
     assert (free.status, free.margin_share) == ("overloaded", 1.0)
@@ -136,8 +127,8 @@ def test_without_a_plan_there_is_no_share() -> None:
 
 def test_what_other_loads_hands_and_rock_do_is_told_without_margins() -> None:
     extras = frozenset({"load_factor", "spread"})
-    bare = plan(replace(asked("overhang"), want=extras))
-    kept = plan(replace(asked("overhang", margins="if_possible"), want=extras))
+    bare = plan(replace(limited("overhang"), want=extras))
+    kept = plan(replace(limited("overhang", margins="if_possible"), want=extras))
     assert kept.load_factor == bare.load_factor
     assert kept.spread is not None
     assert bare.spread is not None
@@ -152,26 +143,26 @@ def test_what_other_loads_hands_and_rock_do_is_told_without_margins() -> None:
 @pytest.mark.parametrize("name", ["wall-300", "slab"])
 @pytest.mark.parametrize("objective", ["min_effort", "max_reliability"])
 def test_what_is_kept_does_not_depend_on_the_objective(name: str, objective: str) -> None:
-    bare = asked(name, margins="if_possible", hold_margin=5.0)
+    bare = limited(name, margins="if_possible", hold_margin=5.0)
     answer = plan(replace(bare, objective=objective))
     assert answer.status == "optimal"
     assert answer.margin_share == pytest.approx(plan(bare).margin_share, abs=1e-6)
 
 
 def test_compliant_wrists_keep_a_share_to_a_hundredth() -> None:
-    answer = plan(asked("wall-300", "compliant", margins="if_possible", hold_margin=8.0))
+    answer = plan(limited("wall-300", "compliant", margins="if_possible", hold_margin=8.0))
     share = answer.margin_share
     assert answer.status == "optimal"
     assert share is not None
     assert 0.0 < share < 1.0
-    again = plan(asked("wall-300", "compliant", hold_margin=8.0 * share))
+    again = plan(limited("wall-300", "compliant", hold_margin=8.0 * share))
     assert again.utilisation == pytest.approx(answer.utilisation, abs=5e-3)
 
 
 def test_a_prepared_stance_has_no_margins_until_they_are_added() -> None:
-    prepared = prepare_stance(asked("wall-300", margins="if_possible", palm_margin=4.0))
+    prepared = prepare_stance(limited("wall-300", margins="if_possible", palm_margin=4.0))
     assert not prepared.question.limits.asked_margins
-    plain = prepare_stance(asked("wall-300", hold_margin=2.0, palm_margin=4.0))
+    plain = prepare_stance(limited("wall-300", hold_margin=2.0, palm_margin=4.0))
     for own, other in zip(
         prepared.with_margins(plain.question.limits).hands.spaces, plain.hands.spaces, strict=True
     ):
@@ -181,7 +172,7 @@ def test_a_prepared_stance_has_no_margins_until_they_are_added() -> None:
 
 def test_streams_and_other_words_are_refused() -> None:
     with pytest.raises(InvalidInputError) as caught:
-        WrenchStream(asked("wall-300", margins="if_possible"))
+        WrenchStream(limited("wall-300", margins="if_possible"))
     assert caught.value.field == "limits.margins"
     assert "valid is required" in caught.value.message
     with pytest.raises(InvalidInputError) as caught:

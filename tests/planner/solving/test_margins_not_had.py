@@ -5,19 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from msgspec import structs
 
-from planner import Limits, Plan, Question, plan
+from planner import Plan, plan
 from planner.result import Finding
-from service.answering import question
-from service.commands.stances import read_request
-
-
-def asked(name: str, wrist: str = "fixed", **limits: float) -> Question:
-    request = read_request(name)
-    hands = [structs.replace(hand, wrist=wrist) for hand in request.stance.hands]
-    stance = structs.replace(request.stance, hands=hands)
-    return question(structs.replace(request, stance=stance, limits=Limits(**limits)))
+from tests.suite.helpers.stances import limited
 
 
 def found(answer: Plan) -> list[Finding]:
@@ -26,8 +17,8 @@ def found(answer: Plan) -> list[Finding]:
 
 @pytest.mark.parametrize("wrist", ["fixed", "compliant"])
 def test_a_margin_that_costs_the_plan_is_named_with_what_goes_without(wrist: str) -> None:
-    answer = plan(asked("wall-300", wrist, hold_margin=5.0))
-    bare = plan(asked("wall-300", wrist))
+    answer = plan(limited("wall-300", wrist, hold_margin=5.0))
+    bare = plan(limited("wall-300", wrist))
     assert (answer.status, bare.status) == ("overloaded", "optimal")
     (finding,) = found(answer)
     assert (finding.field, finding.unit) == ("limits.hold_margin", "1")
@@ -37,18 +28,18 @@ def test_a_margin_that_costs_the_plan_is_named_with_what_goes_without(wrist: str
 
 
 def test_all_margins_are_named() -> None:
-    answer = plan(asked("ledge", least_tension=60.0, hold_margin=200.0))
+    answer = plan(limited("ledge", least_tension=60.0, hold_margin=200.0))
     assert answer.status == "overloaded"
     (finding,) = found(answer)
     assert "hold_margin of 200 N and least_tension of 60 N" in finding.message
-    assert finding.value == pytest.approx(plan(asked("ledge")).utilisation)
+    assert finding.value == pytest.approx(plan(limited("ledge")).utilisation)
 
 
 def test_nothing_is_said_of_margins_that_are_had_or_do_not_decide() -> None:
-    assert not found(plan(asked("wall-300", hold_margin=2.0)))
+    assert not found(plan(limited("wall-300", hold_margin=2.0)))
     # overloaded with or without
-    answer = plan(asked("boulders", hold_margin=5.0))
+    answer = plan(limited("boulders", hold_margin=5.0))
     assert answer.status == "overloaded"
     assert not found(answer)
-    quiet = replace(asked("wall-300", hold_margin=5.0), explain=False)
+    quiet = replace(limited("wall-300", hold_margin=5.0), explain=False)
     assert not found(plan(quiet))

@@ -24,16 +24,9 @@ from service.processes import Interrupted
 from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, complaint, result
 from tests.suite.helpers.processes import begun, ended, until, watched, workers
 from tests.suite.helpers.requests import pose_of, wall_request
-from tests.suite.helpers.rocks import cylinder_mesh, fractal_wall
+from tests.suite.helpers.rocks import cylinder_mesh
 
 COARSE = ["--spacing", "0.15", "--angles", "1", "--outer-rotation", "0"]
-
-
-@pytest.fixture(scope="module")
-def rock(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("rock") / "wall.ply"
-    trimesh.Trimesh(*fractal_wall(3, size=0.5, count=101), process=False).export(path)
-    return path
 
 
 def test_holds_are_written_sorted_and_drawn(rock, tmp_path, capfd):

@@ -11,13 +11,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-import trimesh
 
 from service.commands.cli import run_command_line
 from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED, complaint
 from tests.suite.helpers.processes import begun, until, watched
 from tests.suite.helpers.requests import wall_request
-from tests.suite.helpers.rocks import fractal_wall
 
 COUNT = 2000
 
@@ -43,13 +41,6 @@ def lines(tmp_path: Path) -> Path:
 def few(tmp_path: Path) -> Path:
     path = tmp_path / "few.jsonl"
     path.write_text(json.dumps(wall_request()) + "\n", encoding="utf-8")
-    return path
-
-
-@pytest.fixture(scope="module")
-def rock(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("rock") / "wall.ply"
-    trimesh.Trimesh(*fractal_wall(3, size=0.5, count=101), process=False).export(path)
     return path
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import pytest
 import zenoh
 
 from service.servers import LiveServers, rivals_in_words
@@ -14,17 +11,11 @@ from tests.suite.helpers.patience import PATIENCE, soon
 from tests.suite.helpers.served import client_config, free_endpoint
 
 
-@pytest.fixture
-def session() -> Iterator[zenoh.Session]:
-    with open_session(zenoh_config(settings=["listen/endpoints:[]"], multicast=False)) as opened:
-        yield opened
-
-
-def test_services_are_asked_in_turns_and_least_first(session: zenoh.Session) -> None:
+def test_services_are_asked_in_turns_and_least_first(alone: zenoh.Session) -> None:
     tokens = {
-        name: session.liveliness().declare_token(server_key("r", name)) for name in ("a", "b", "c")
+        name: alone.liveliness().declare_token(server_key("r", name)) for name in ("a", "b", "c")
     }
-    servers = LiveServers(session, "r", PATIENCE)
+    servers = LiveServers(alone, "r", PATIENCE)
     assert soon(lambda: len(servers.names()) == 3)
     turns = [servers.next() for _ in range(6)]
     assert sorted(turns[:3]) == ["a", "b", "c"]

@@ -13,7 +13,7 @@ from service.servers import open_session as open_at_any
 from service.serving import open_session, zenoh_config
 from service.wire import NoServiceError, service_key
 from tests.suite.helpers.patience import PATIENCE, soon
-from tests.suite.helpers.served import client_config, free_endpoint
+from tests.suite.helpers.served import client_config, free_endpoint, lonely_config
 
 WAIT = 0.6
 """Where nobody comes, a client waits so long: each endpoint is tried [s]."""
@@ -89,6 +89,5 @@ def test_a_client_says_which_robots_have_services(endpoint: str, router: zenoh.S
 def test_a_client_says_whether_it_is_connected(endpoint: str, router: zenoh.Session) -> None:
     with pytest.raises(NoServiceError, match=r"is connected, but .* compiles for minutes"):
         CruxClient(client_config(endpoint), wait=0.2)
-    alone = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
     with pytest.raises(NoServiceError, match=r"within 0\.2 s: this session is connected to nobody"):
-        CruxClient(alone, wait=0.2)
+        CruxClient(lonely_config(), wait=0.2)

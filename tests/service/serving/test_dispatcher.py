@@ -300,12 +300,10 @@ def test_a_process_that_stands_ready_takes_the_place_of_one_that_ends(
 
 
 @pytest.mark.slow
-def test_a_service_whose_processes_do_not_start_says_so() -> None:
-    config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
+def test_a_service_whose_processes_do_not_start_says_so(alone: zenoh.Session) -> None:
     with (
-        open_session(config) as session,
         pytest.raises(LostError, match="workers started"),
-        PlanService(session, make=never_ready),
+        PlanService(alone, make=never_ready),
     ):
         pass
 

@@ -16,6 +16,7 @@ from service.serving import config, server, zenoh_config
 from service.wire import LARGEST_REQUEST
 from tests.service.serving.test_service import setting
 from tests.suite.helpers.requests import plan_request
+from tests.suite.helpers.served import lonely_config
 
 LINGER = struct.pack("ii", 1, 10)
 """As zenoh sets it: closing waits for 10 s."""
@@ -80,6 +81,6 @@ def test_a_client_sends_nothing_that_no_service_takes_in(monkeypatch: pytest.Mon
         raise LimitError(f"{size} bytes of {kind.__name__}")
 
     monkeypatch.setattr(asking, "check_size", refuse)
-    alone = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
-    with CruxClient(alone) as client, pytest.raises(LimitError, match="bytes of PlanRequest"):
+    refusal = pytest.raises(LimitError, match="bytes of PlanRequest")
+    with CruxClient(lonely_config()) as client, refusal:
         client.plan(plan_request())

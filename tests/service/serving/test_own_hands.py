@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import msgspec
@@ -15,7 +15,7 @@ from service.answering import dispatch, with_hand
 from service.answering.own_models import over_default
 from service.commands.cli import run_command_line
 from service.requests import PlanRequest
-from service.serving import CruxClient, PlanService, open_session, zenoh_config
+from service.serving import CruxClient, PlanService
 from service.wire import ServiceError
 from tests.suite.helpers.commands import result
 from tests.suite.helpers.hands import entry_toml
@@ -23,12 +23,6 @@ from tests.suite.helpers.own_hands import THICK, WEAK, own, request_for, untimed
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.requests import HEAVY, full_request, put, wall_request
 from tests.suite.helpers.served import Served, client_config, free_endpoint
-
-
-@pytest.fixture
-def alone() -> Iterator[zenoh.Session]:
-    with open_session(zenoh_config(settings=["listen/endpoints:[]"], multicast=False)) as opened:
-        yield opened
 
 
 @pytest.mark.slow

@@ -48,7 +48,7 @@ from tests.suite.helpers.requests import (
     spoil,
     wall_request,
 )
-from tests.suite.helpers.served import Served, client_config, free_endpoint
+from tests.suite.helpers.served import Served, client_config, free_endpoint, lonely_config
 
 PLAN = service_key("robosimian", "plan")
 WRENCH_SPACE = service_key("robosimian", "wrench_space")
@@ -211,9 +211,8 @@ def test_the_client_asks_for_the_service_s_health(session: zenoh.Session) -> Non
 def test_nobody_there() -> None:
     with pytest.raises(NoServiceError, match="no zenoh session"):
         CruxClient(client_config(free_endpoint()))
-    alone = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
     with (
-        CruxClient(alone, timeout=PATIENCE) as client,
+        CruxClient(lonely_config(), timeout=PATIENCE) as client,
         pytest.raises(NoServiceError, match="no service answers at"),
     ):
         client.plan(plan_request())
@@ -222,13 +221,6 @@ def test_nobody_there() -> None:
 def test_a_robot_that_nobody_plans_for(session: zenoh.Session) -> None:
     with pytest.raises(NoServiceError, match="crux/loris/plan"):
         CruxClient(session, "loris", timeout=PATIENCE).plan(plan_request())
-
-
-@pytest.fixture
-def alone() -> Iterator[zenoh.Session]:
-    """A session that is its own whole network."""
-    with open_session(zenoh_config(settings=["listen/endpoints:[]"], multicast=False)) as opened:
-        yield opened
 
 
 def test_a_service_that_does_not_answer_in_time(alone: zenoh.Session) -> None:

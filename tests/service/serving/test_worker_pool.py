@@ -11,8 +11,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+import zenoh
 
-from service.serving import PlanService, open_session, worker_pool, zenoh_config
+from service.serving import PlanService, worker_pool
 from service.serving.settings import SERVING_SETTINGS, ServingSettings
 from service.serving.worker_pool import WorkerPool
 from service.wire import LostError
@@ -126,7 +127,7 @@ def test_only_processes_that_are_ready_count(
 
 
 def test_a_service_for_which_no_process_can_be_started_says_so(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, alone: zenoh.Session
 ) -> None:
     tried = []
 
@@ -136,11 +137,9 @@ def test_a_service_for_which_no_process_can_be_started_says_so(
 
     monkeypatch.setattr(worker_pool, "WorkerHandle", refused)
     monkeypatch.setattr(worker_pool, "SERVING_SETTINGS", ServingSettings(first_rest=0.05))
-    config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
     with (
-        open_session(config) as session,
         pytest.raises(LostError, match="workers started"),
-        PlanService(session, make=obedient),
+        PlanService(alone, make=obedient),
     ):
         pass
     # each after a rest, the last perhaps while the start is given up; not at each of its turns

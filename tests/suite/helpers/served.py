@@ -7,11 +7,13 @@ import os
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import zenoh
 
-from service.serving import zenoh_config
+from service.serving import open_session, zenoh_config
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.patience import PATIENCE
 
@@ -47,6 +49,18 @@ class Served:
         self.process.send_signal(number)
         out, err = self.process.communicate(timeout=PATIENCE)
         return out.decode(), err.decode()
+
+
+def lonely_config() -> zenoh.Config:
+    """Configuration of a session that is its own whole network."""
+    return zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
+
+
+@contextmanager
+def lonely_session() -> Iterator[zenoh.Session]:
+    """A session that is its own whole network."""
+    with open_session(lonely_config()) as opened:
+        yield opened
 
 
 def client_config(endpoint: str) -> zenoh.Config:

@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from msgspec import structs
 from scipy.spatial.transform import Rotation
 
 from hand_models.base import InvalidInputError, Pose, wrench_transport
@@ -20,9 +21,11 @@ from hand_models.rock import Cylinder, Edge, Hold, Plane, Sphere
 from hand_models.tile import Surface
 from planner.prepare import hand_space
 from planner.programs import WRENCH_UNIT, HandData, StanceData
-from planner.question import HandOnHold, Load, Question, Stance
+from planner.question import HandOnHold, Limits, Load, Question, Stance
 from planner.result import Plan
 from planner.solving import plan
+from service import answering
+from service.commands.stances import read_request
 
 PLACES = {
     "front_right": (0.5, -0.4),
@@ -81,6 +84,14 @@ def ask(stance: Stance, *want: str, **kwargs) -> Question:
     if "body_wrench" not in kwargs:
         kwargs.setdefault("load", CALIBRATION_LOAD)
     return Question(stance, want=frozenset(want), **kwargs)
+
+
+def limited(name: str, wrist: str = "fixed", **limits: object) -> Question:
+    """The question of a bundled stance with the same wrist of all hands, and other limits."""
+    request = read_request(name)
+    hands = [structs.replace(hand, wrist=wrist) for hand in request.stance.hands]
+    stance = structs.replace(request.stance, hands=hands)
+    return answering.question(structs.replace(request, stance=stance, limits=Limits(**limits)))
 
 
 def complying(question: Question, limbs: tuple[str, ...] = tuple(PLACES)) -> Question:
