@@ -134,12 +134,8 @@ def _wrist(limb: str) -> Iterator[Column]:
             yield Column(f"{limb}_{part}_{axis}_{unit}", "float", unit, f"{axis} {meaning}", path)
 
 
-def route_columns() -> tuple[Column, ...]:
-    """Return all columns of a table of routes, one row for each route."""
-    return tuple(_route_columns())
-
-
-def _route_columns() -> Iterator[Column]:
+def route_columns() -> Iterator[Column]:
+    """Yield all columns of a table of routes, one row for each route."""
     yield from _asked()
     yield Column("name", "text", "", "the route's")
     yield Column("status", "text", "", "of the stage that is worst off; empty for an error")
@@ -157,12 +153,8 @@ def _route_columns() -> Iterator[Column]:
     yield from _failed()
 
 
-def climb_columns() -> tuple[Column, ...]:
-    """Return all columns of a table of climbs that are searched for, one row for each rock."""
-    return tuple(_climb_columns())
-
-
-def _climb_columns() -> Iterator[Column]:
+def climb_columns() -> Iterator[Column]:
+    """Yield all columns of a table of climbs that are searched for, one row for each rock."""
     yield from _asked()
     yield Column("name", "text", "", "the climb's")
     yield Column("robot", "text", "", "name of the robot")

@@ -101,7 +101,7 @@ def route_listing() -> Listing:
         tables.number("util", "utilisation", _decimal),
         tables.number("load factor", "load_factor", _decimal),
     )
-    kind, columns = wire.ServiceName.ROUTE, bulk.route_columns()
+    kind, columns = wire.ServiceName.ROUTE, tuple(bulk.route_columns())
     return Listing(kind, "routes", "planning routes", 50, columns, printed, lambda answers: answers)
 
 
@@ -115,7 +115,7 @@ def climb_listing() -> Listing:
         tables.number("moves"),
         tables.number("knots"),
     )
-    kind, columns = wire.ServiceName.CLIMB, bulk.climb_columns()
+    kind, columns = wire.ServiceName.CLIMB, tuple(bulk.climb_columns())
     return Listing(kind, "rocks", "searching rocks", 1000, columns, printed, with_options)
 
 

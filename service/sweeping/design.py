@@ -16,7 +16,7 @@ from hand_models.base import InvalidInputError, LimitError
 from service.requests import PlanRequest
 from service.sweeping.paths import Paths, Steps, Target, set_value
 from service.sweeping.variation import Value, Variation
-from service.wire import Format, decode_request
+from service.wire import Format, decode_request, dotted
 
 if TYPE_CHECKING:
     from service.answering import Robots
@@ -212,13 +212,8 @@ class Design:
                     question(asked, robots or robots_of(None))
                 except InvalidInputError as error:
                     # whatever else is wrong is an error at its point
-                    if f".{error.field}" in map(_dotted, self.targets[i].steps):
+                    if f".{error.field}" in map(dotted, self.targets[i].steps):
                         raise
-
-
-def _dotted(steps: Steps) -> str:
-    """Return steps as the field of an error has them, after a dot."""
-    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps)
 
 
 def _check_apart(variations: Sequence[Variation], targets: Sequence[Target]) -> None:

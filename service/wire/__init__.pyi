@@ -35,6 +35,7 @@ from .sizes import (
 from .validation_errors import (
     PossibleType as PossibleType,
     Step as Step,
+    dotted as dotted,
     entered as entered,
     field_names as field_names,
     places_at as places_at,

@@ -17,7 +17,15 @@ from msgspec import inspect
 from hand_models.base import InvalidInputError
 from service.requests import Later
 
-__all__ = ["PossibleType", "Step", "entered", "field_names", "places_at", "validation_error"]
+__all__ = [
+    "PossibleType",
+    "Step",
+    "dotted",
+    "entered",
+    "field_names",
+    "places_at",
+    "validation_error",
+]
 
 Step = str | int | None
 """Step of a path: a field name, an index, or None for a key of a dict, which the client chooses."""
@@ -54,7 +62,7 @@ def validation_error(
     places = places_at(kind, steps)
     types = [place.kind for place in places]
     where = _with_keys(path, steps, document, decode)
-    field = path if where is None else _dotted(where)
+    field = path if where is None else dotted(where)
     cause = error.__cause__
     if isinstance(cause, InvalidInputError):
         cause = cause.within(field.removeprefix("."))
@@ -128,7 +136,8 @@ def _with_keys(
     return known
 
 
-def _dotted(steps: Iterable[str | int]) -> str:
+def dotted(steps: Iterable[str | int]) -> str:
+    """Return the steps of a path as the field of an error has them, after a dot."""
     return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps)
 
 
@@ -360,12 +369,8 @@ def field_names(types: Iterable[inspect.Type]) -> list[str]:
     for kind in types:
         if isinstance(kind, inspect.StructType):
             names += [kind.tag_field] if kind.tag_field else []
-            names += [field.name for field in kind.fields if not _comes_later(field.type)]
+            names += [field.name for field in kind.fields if field.type != _known(Later)]
     return list(dict.fromkeys(names))
-
-
-def _comes_later(kind: inspect.Type) -> bool:
-    return kind == _known(Later)
 
 
 @cache
