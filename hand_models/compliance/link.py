@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.finger import PHALANGES, Contact, SettledFinger, middle_of_bed
+from hand_models.finger import PHALANGES, SettledFinger, middle_of_bed
 from hand_models.sections import Section, Vector2
 
 __all__ = ["FingerLink", "Numbers", "across", "bearing_angle", "dot", "links_of", "turned", "unit"]
@@ -236,7 +236,7 @@ def _link(
         out = section.normal(point)
         into = (-out[0], -out[1])
         gap, away = max(section.clearance(point), 0.0), 0.0
-        curvature = _curvature(section, contact, point, model.tile_length, gap)
+        curvature = _curvature(section, point, model.tile_length, gap)
     else:
         curvature, away, gap = _under_face(section, point, u, model.tile_length)
     near, far = model.tile_range
@@ -307,9 +307,7 @@ def _under_face(
     return 1.0 / radius, (before - after) * (2.0 * radius + before + after) / (4.0 * e), here
 
 
-def _curvature(
-    section: Section, contact: Contact, point: Vector2, length: float, gap: float
-) -> float:
+def _curvature(section: Section, point: Vector2, length: float, gap: float) -> float:
     """Return the rock's curvature near a contact, from its distance beside it [1/m]."""
     out = section.normal(point)
     foot = (point[0] - gap * out[0], point[1] - gap * out[1])

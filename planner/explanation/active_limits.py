@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from hand_models.base import Array, Indices
 from hand_models.fixed_wrist import FINGER_TWIST
 from hand_models.wrench_spaces import Row, WrenchSpace
-from planner.prepare import KEPT_NAMES
 from planner.programs import CAP_SLACK, JOINT_FORCE, JOINT_TORQUE
 from planner.result import LimitName, Price
 
@@ -244,7 +243,7 @@ Named = tuple[tuple[LimitName, ...], Indices]
 """Distinct limits of some hands, and the index of the limit of each row, shape (sum of nl,)."""
 
 
-@lru_cache(maxsize=KEPT_NAMES)
+@lru_cache(maxsize=256)  # lists of names, some 5 kB each
 def _named(sets: tuple[tuple[Row, ...], ...], limbs: tuple[str, ...]) -> Named:
     """Return the limits of hands of limbs by the rows of their sets."""
     names = [

@@ -98,7 +98,7 @@ def certify(
     else:
         found = _contradiction(system, limbs)
     if found is None or not system.proves(*found):
-        found = _multipliers(system, known, capped=cap is not None)
+        found = _multipliers(known, capped=cap is not None)
     if found is None or not system.proves(*found):
         return None
     direction, multipliers = found
@@ -231,9 +231,7 @@ def _contradiction(system: HardRowSystem, limbs: Sequence[str]) -> tuple[Array, 
     return None
 
 
-def _multipliers(
-    system: HardRowSystem, outcome: Outcome, *, capped: bool
-) -> tuple[Array, Array] | None:
+def _multipliers(outcome: Outcome, *, capped: bool) -> tuple[Array, Array] | None:
     """Return a unit d and λ from the multipliers of a program without a plan.
 
     Where d is next to none, rows contradict each other whatever the body needs.

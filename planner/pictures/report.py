@@ -297,9 +297,7 @@ def draw_route(result: RouteResult) -> Figure:
     figure.suptitle(result.route.name, parse_math=False)
     for axes, band in zip((upper, lower), bands, strict=True):
         _draw_band(axes, band, _of_draws(result.plans))
-    upper.legend(
-        **{"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}, ncols=7, fontsize=8, frameon=False
-    )
+    upper.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=7, fontsize=8, frameon=False)
     factor = np.array([np.nan if p.load_factor is None else p.load_factor for p in result.plans])
     lower.plot(index, factor, "o-", color="0.2")
     lower.axhline(1.0, color=COLOUR_OF["red"])

@@ -4,7 +4,6 @@ from .drawn_stance import (
 )
 from .hand_batch import (
     CONTACT_CODES as CONTACT_CODES,
-    KEPT_NAMES as KEPT_NAMES,
     HandBatch as HandBatch,
     TileIndex as TileIndex,
     concatenated as concatenated,

@@ -21,7 +21,6 @@ from hand_models.hand import FINGERS, NAIL, SettledHand, SettledTile
 
 __all__ = [
     "CONTACT_CODES",
-    "KEPT_NAMES",
     "ContactPattern",
     "HandBatch",
     "TileIndex",
@@ -29,9 +28,6 @@ __all__ = [
     "contact_pattern_of",
     "tile_index_of",
 ]
-
-KEPT_NAMES: Final = 256
-"""Bound of the caches of layouts, by lists of names (tiles, columns, rows): some 5 kB each."""
 
 Number = TypeVar("Number", bound=np.generic)
 

@@ -22,7 +22,6 @@ from hand_models.tile import HalfPlane, inner_half_planes
 from hand_models.wrench_spaces import WRENCH_SCALE, Row, WrenchSpace
 from planner.prepare import (
     CONTACT_CODES,
-    KEPT_NAMES,
     HandBatch,
     concatenated,
     contact_pattern_of,
@@ -85,7 +84,7 @@ class _LoadLayout(NamedTuple):
     efforts: Indices
 
 
-@lru_cache(maxsize=KEPT_NAMES)
+@lru_cache(maxsize=256)  # layouts of some 5 kB each
 def _layout_of(
     tiles: tuple[tuple[SettledTile, ...], ...],
     columns: tuple[tuple[str, ...], ...],

@@ -49,7 +49,7 @@ def findings(scene: Scene) -> tuple[Finding, ...]:
     return (
         *_out_of_reach(scene),
         *_palms(scene, away, above),
-        *_reversed(scene, back & ~away, along),
+        *_reversed(back & ~away, along),
         *_in_rock(scene, away, above, along),
         *_overlapping(scene),
         *_in_body(scene),
@@ -106,7 +106,7 @@ def _palms(scene: Scene, away: NDArray[np.bool_], above: Array) -> Iterator[Find
         yield Finding("palm_away", _of_hand(i, "pose.orientation"), message, float(above[i]), "m")
 
 
-def _reversed(scene: Scene, back: NDArray[np.bool_], along: Array) -> Iterator[Finding]:
+def _reversed(back: NDArray[np.bool_], along: Array) -> Iterator[Finding]:
     """Yield a body that has all its hands behind its back."""
     if back.all():
         value = float(along.mean())
