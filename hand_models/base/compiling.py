@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,32 +14,43 @@ from numpy.typing import NDArray
 
 __all__ = ["compiled", "has_compiled", "record_of"]
 
+Argument = str | np.dtype[Any] | Callable[..., Any] | tuple[Any, ...]
+"""What stands for the type of an argument of a compiled function (`compiled`)."""
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def compiled(*arguments: str | np.dtype[Any]) -> Callable[[Function], Function]:
+def compiled(*arguments: Argument) -> Callable[[Function], Function]:
     """Return a decorator that compiles a function for arguments of given types.
 
     The function is compiled when its module is imported, or loaded from numba's cache if the module
     has not changed since. Import such modules only where their functions are used: importing numba
     takes a quarter of a second. A compiled function may not call compiled functions of other
     modules or read their numbers, since numba's cache does not notice a change there; it takes such
-    numbers as arguments.
+    numbers and functions as arguments.
 
     Parameters
     ----------
-    *arguments : str or numpy.dtype
+    *arguments : str, numpy.dtype, function or tuple
         For each argument ``f`` (float), ``c`` (complex), ``i`` (int) or ``b`` (bool), then the
         number of its dimensions, 0 for a number. Such an array is contiguous, row by row, and is
-        not written to. Several of these with blanks between stand for a tuple. A dtype stands for
-        an array of its records, which may be written to. A function without ``arguments`` can only
-        be called by compiled functions of its own module.
+        not written to. A tuple of arguments, or several with blanks between, stands for a tuple. A
+        dtype stands for an array of its records, which may be written to. A compiled function
+        stands for one with its arguments and result, which is called by its address: so those of
+        other modules are called. To hand one over takes 0.1 ms. A function without ``arguments``
+        can only be called by compiled functions of its own module.
     """
     import numba
 
     types = [_type(each) for each in arguments]
 
     def decorated(function: Function) -> Function:
+        with warnings.catch_warnings():
+            # that functions are handed over is called experimental, since 2020
+            warnings.simplefilter("ignore", numba.NumbaExperimentalFeatureWarning)
+            return _made(function)
+
+    def _made(function: Function) -> Function:
         try:
             made = numba.njit(tuple(types) or None, cache=bool(types))(function)
         except RuntimeError:
@@ -81,14 +93,19 @@ def record_of(numbers: Mapping[str, float]) -> NDArray[np.void]:
     return np.array([tuple(numbers.values())], dtype=fields)
 
 
-def _type(argument: str | np.dtype[Any]) -> Any:
+def _type(argument: Argument) -> Any:
     import numba
 
+    if isinstance(argument, tuple):
+        several: Any = numba.types.Tuple
+        return several([_type(each) for each in argument])
+    if callable(argument):
+        made: Any = argument
+        return numba.types.FunctionType(made.nopython_signatures[0])
     if not isinstance(argument, str):
         return numba.types.Array(numba.from_dtype(argument), 1, "C")
     if " " in argument:
-        several: Any = numba.types.Tuple
-        return several([_type(each) for each in argument.split()])
+        return _type(tuple(argument.split()))
     kinds = {"f": numba.float64, "c": numba.complex128, "i": numba.intp, "b": numba.bool_}
     kind, dimensions = kinds[argument[0]], int(argument[1:])
     return numba.types.Array(kind, dimensions, "C", readonly=True) if dimensions else kind

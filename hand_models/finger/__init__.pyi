@@ -6,7 +6,6 @@ from .closed_finger import (
     lay_across as lay_across,
     straight_lift as straight_lift,
 )
-from .closure import settle_finger as settle_finger
 from .closure_loads import stays as stays, tendon_loads as tendon_loads
 from .finger_path import (
     FingerPath as FingerPath,
@@ -21,6 +20,7 @@ from .sequential_closure import (
     CONTACT_KINDS as CONTACT_KINDS,
     ClosedPhalanx as ClosedPhalanx,
     SequentialClosure as SequentialClosure,
+    settle_finger as settle_finger,
 )
 from .settled_finger import (
     JOINT_STOPS as JOINT_STOPS,

@@ -129,7 +129,7 @@ def lay_across(
     ClosedFinger or None
         None for a finger that closes otherwise.
     """
-    from hand_models.finger.closing import around_rock
+    from hand_models.finger.around import around_rock
 
     section, closing = opened.rock.tile, opened.tension
     laid = [] if section is None else solver.lay(section)
@@ -254,7 +254,7 @@ def _in_rock(
     q: Array,
 ) -> Flags:
     """Return which fingers turned by q have rock in them, at their sides or all over."""
-    from hand_models.finger.closing import around_rock
+    from hand_models.finger.around import around_rock
 
     found = around_rock(rock, shape, drive, q)["gap"].min(axis=1) < -shape.closes
     for i in (~found).nonzero()[0].tolist():
@@ -280,22 +280,19 @@ def _axes(shape: PhalanxShape, q: Array) -> Complexes:
 
 def _refused(shape: PhalanxShape, rock: FingerRock, q: Array) -> Refused:
     """Return how deep rock is in a finger, and the lift that would clear it."""
-    from hand_models.finger.phalanx_gaps import rock_distances
-
     places, most = _axes(shape, q).ravel(), JOINT_COUNT * shape.end
     outline = Outlines.of([rock], 2.0 * most + shape.end, shape.spacing)
-    sides = outline.points[0], outline.centres[0], outline.radii[0]
 
     def depth(lift: float, *, how_far: bool = False) -> float:
         """Return how deep rock is in the finger; where it is, only asked ``how_far`` exactly."""
         lifted = places - 1j * lift
-        near = float(shape.radius - rock_distances(lifted, *sides, 0)[-1])
+        near = float(shape.radius - outline.least_distance(lifted))
         if near > 0.0 and not how_far:
             return near
         inside = lifted[_inside(rock, lifted)]
         if not len(inside):
             return near
-        return float(shape.radius + rock_distances(inside, *sides, 1).max())
+        return float(shape.radius + outline.distances(inside).max())
 
     now, low, high = max(depth(0.0, how_far=True), shape.closes), 0.0, most
     if depth(high) > 0.0:

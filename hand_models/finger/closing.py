@@ -37,6 +37,7 @@ from typing import Any
 import numpy as np
 
 from hand_models.base import Array, compiled, go_on
+from hand_models.finger.around import AROUND_PARTS, ROCK_TYPES, around_rock, put_around
 from hand_models.finger.contact_states import LINEARISED_FIELDS, contact_states, put_forces
 from hand_models.finger.path_state import (
     AROUND_FIELDS,
@@ -46,40 +47,20 @@ from hand_models.finger.path_state import (
     SETTINGS_RECORD,
     SHAPE_FIELDS,
     STATE_FIELDS,
+    WALK_FIELDS,
     Balanced,
     Record,
     Records,
+    open_walks,
 )
-from hand_models.finger.phalanx_gaps import put_around
 from hand_models.finger.phalanx_shape import PhalanxShape
 from hand_models.finger.settings import SETTINGS
 from hand_models.sections import Flags, Outlines
 
-__all__ = ["Balanced", "around_rock", "follow"]
+__all__ = ["Balanced", "follow"]
 
-
-def around_rock(rock: Outlines, shape: PhalanxShape, drive: Records, q: Array) -> Records:
-    """Return gaps, engagement and lever arms of n fingers at joint angles, with derivatives.
-
-    Parameters
-    ----------
-    rock : Outlines
-        Rock in the plane of each finger.
-    shape : PhalanxShape
-    drive : ndarray, shape (n,)
-        Records of `DRIVE_FIELDS`.
-    q : ndarray, shape (n, 3)
-        Joint angles [rad].
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Records of `AROUND_FIELDS`, with derivatives by the joint angles.
-    """
-    found, bar = np.zeros(len(q), AROUND_FIELDS), shape.record
-    for i, own in enumerate(zip(*rock, strict=True)):
-        put_around(SETTINGS_RECORD, bar, drive["depth"][i], q[i], found[i : i + 1], *own)
-    return found
+_WALK_PARTS = put_around, *AROUND_PARTS, contact_states, put_forces
+_KEPT_FIELDS = STATE_FIELDS, AROUND_FIELDS, LINEARISED_FIELDS
 
 
 def follow(
@@ -106,59 +87,23 @@ def follow(
 
     Returns
     -------
-    states : ndarray, shape (n,)
-        State of each finger at the end of its path, records of `STATE_FIELDS`.
-    around : ndarray, shape (n,)
-        Gaps, engagement and lever arms there, records of `AROUND_FIELDS`.
+    states, around : ndarray, shape (n,)
+        State of each finger at the end of its path, and what is around it there: records of
+        `STATE_FIELDS` and of `AROUND_FIELDS`.
     resting : ndarray of bool, shape (n,)
         Whether each finger came to rest.
     """
     states, around = start.copy(), around_rock(rock, shape, drive, start["q"])
-    resting = np.zeros(len(start), dtype=bool)
-    for i, own in enumerate(zip(*rock, strict=True)):
-        one = slice(i, i + 1)
-        course = None if courses is None else courses[i]
-        states[one], around[one], resting[i] = _followed(
-            own, shape.record, drive[one], states[one], around[one], course
-        )
-    return states, around, resting
-
-
-def _followed(
-    rock: tuple[Any, ...],
-    shape: Records,
-    drive: Records,
-    state: Records,
-    around: Records,
-    course: list[Balanced] | None,
-) -> tuple[Records, Records, bool]:
-    """Return a finger at the end of its path, what is around it, and whether it came to rest."""
-    after, there, trial = state.copy(), around.copy(), state.copy()
-    now = np.zeros(1, LINEARISED_FIELDS)
-    fixed = (SETTINGS_RECORD, CODE_RECORD, shape, drive)
-    depth, slow, still = drive["depth"][0], 0, 0
-    most = 0.1 * SETTINGS.most_damping * drive["torque"][0]
-    for step in range(SETTINGS.most_increments):
+    walks, finger, most = open_walks(start), 0, SETTINGS.increments_at_once
+    kept = tuple([np.zeros(0 if courses is None else most, each) for each in _KEPT_FIELDS])
+    fixed = (SETTINGS_RECORD, CODE_RECORD, shape.record), drive
+    while finger < len(start):
         go_on()
-        balance = SETTINGS.balance if step <= SETTINGS.long_path else SETTINGS.late_balance
-        least = _begun(SETTINGS_RECORD, CODE_RECORD, state, around, trial)
-        contact_states(*fixed, trial, around, least, now)
-        if drive["lowers"][0]:
-            # one that moves to and fro at a tension goes on without a balance there
-            still = still + 1 if after["s"][0] == state["s"][0] else 0
-            drive["lowers"] = 2 if still > SETTINGS.patience else 1
-        rests = _increment(*fixed, state, around, now, balance, after)
-        slow = slow + 1 if after["damping"][0] > most else 0
-        if rests or slow > SETTINGS.patience:
-            return after, around, rests
-        put_around(SETTINGS_RECORD, shape, depth, after["q"][0], there, *rock)
-        put_forces(SETTINGS_RECORD, CODE_RECORD, drive, after, there, now)
-        left = _judged(*fixed, state, around, after, there, now)
-        if left < np.inf:
-            if course is not None and left <= SETTINGS.balanced * drive["torque"][0]:
-                course.append(Balanced(after.copy(), there.copy(), now.copy()))
-            state, after, around, there = after, state, there, around
-    return state, around, False
+        own: Any = states, around, walks, finger, most, kept, rock.arrays
+        before, (finger, count) = finger, _walk(*_WALK_PARTS, *fixed, *own)
+        if courses is not None:
+            courses[before] += [Balanced(*(each[[i]] for each in kept)) for i in range(count)]
+    return states, around, walks["rests"] != 0
 
 
 @compiled()
@@ -167,7 +112,7 @@ def _caught(settings: Record, state: Record, around: Record, j: int) -> bool:
     return bool(1.0 - max(1.0 - around.share[j] + state.off[j], 0.0) > settings.least_share)
 
 
-@compiled(SETTINGS_RECORD.dtype, CODE_RECORD.dtype, STATE_FIELDS, AROUND_FIELDS, STATE_FIELDS)
+@compiled()
 def _begun(settings: Record, code: Record, state: Record, around: Record, trial: Record) -> Array:
     """Write the state with which an increment begins; return the gaps that spines keep [m]."""
     settings, code, state, around, trial = settings[0], code[0], state[0], around[0], trial[0]
@@ -175,7 +120,6 @@ def _begun(settings: Record, code: Record, state: Record, around: Record, trial:
     least = np.empty(JOINT_COUNT)
     for j in range(JOINT_COUNT):
         caught = _caught(settings, state, around, j)
-        # how far a phalanx may be off the rock
         least[j] = state.least[j] if caught else np.inf
         # spines hold no longer than rock is within their travel
         lets = state.mode[j] == code.held and not caught
@@ -218,10 +162,7 @@ def _product(A: Array, x: Array, i: int) -> float:
     return total
 
 
-@compiled(
-    *(SETTINGS_RECORD.dtype, CODE_RECORD.dtype, SHAPE_FIELDS, DRIVE_FIELDS),
-    *(STATE_FIELDS, AROUND_FIELDS, LINEARISED_FIELDS, "f0", STATE_FIELDS),
-)
+@compiled()
 def _increment(
     settings: Record,
     code: Record,
@@ -337,10 +278,7 @@ def _increment(
     return rests
 
 
-@compiled(
-    *(SETTINGS_RECORD.dtype, CODE_RECORD.dtype, SHAPE_FIELDS, DRIVE_FIELDS),
-    *(STATE_FIELDS, AROUND_FIELDS, STATE_FIELDS, AROUND_FIELDS, LINEARISED_FIELDS),
-)
+@compiled()
 def _judged(
     settings: Record,
     code: Record,
@@ -391,3 +329,72 @@ def _judged(
     if falls and after.s >= drive.end and after.damping <= state.damping:
         after.damping = _falls(settings, drive, after.damping)
     return float(most)
+
+
+@compiled(
+    *(*_WALK_PARTS, (SETTINGS_RECORD.dtype, CODE_RECORD.dtype, SHAPE_FIELDS)),
+    *(DRIVE_FIELDS, STATE_FIELDS, AROUND_FIELDS, WALK_FIELDS, "i0", "i0"),
+    *(_KEPT_FIELDS, ROCK_TYPES),
+)
+def _walk(
+    put: Any,
+    nearby: Any,
+    beside: Any,
+    find_states: Any,
+    find_forces: Any,
+    fixed: tuple[Record, Record, Record],
+    drives: Record,
+    states: Record,
+    arounds: Record,
+    walks: Record,
+    finger: int,
+    most: int,
+    kept: tuple[Record, Record, Record],
+    rocks: Any,
+) -> tuple[int, int]:
+    """Go on with the paths of fingers, from one on; of that one alone if its balances are kept.
+
+    Return the finger to go on with next, and the number of balances that were kept. The first
+    are `_WALK_PARTS`; ``most``: number of increments at most; ``rocks``: `Outlines.arrays`.
+    """
+    (settings, code, shape), (balances, arounds_there, forces) = fixed, kept
+    now, trial, count = np.zeros(1, LINEARISED_FIELDS), states[:1].copy(), 0
+    last = min(len(states), finger + 1) if len(balances) else len(states)
+    while finger < last and most > 0:
+        state, around = states[finger : finger + 1].copy(), arounds[finger : finger + 1].copy()
+        after, there, ends = state.copy(), around.copy(), False
+        drive, walk, torque = drives[finger : finger + 1], walks[finger], drives[finger].torque
+        tough = 0.1 * settings[0].most_damping * torque
+        while most > 0 and not ends:
+            most, walk.step = most - 1, walk.step + 1
+            least = _begun(settings, code, state, around, trial)
+            find_states(settings, code, shape, drive, trial, around, least, now)
+            if drive[0].lowers:
+                # one that moves to and fro at a tension goes on without a balance there
+                walk.still = walk.still + 1 if walk.s == state[0].s else 0
+                drive[0].lowers = 2 if walk.still > settings[0].patience else 1
+            late = walk.step > settings[0].long_path + 1
+            balance = settings[0].late_balance if late else settings[0].balance
+            rests = _increment(settings, code, shape, drive, state, around, now, balance, after)
+            walk.slow = walk.slow + 1 if after[0].damping > tough else 0
+            walk.s = after[0].s
+            if rests or walk.slow > settings[0].patience:
+                state, walk.rests, ends = after, rests, True
+                continue
+            put(nearby, beside, settings, shape, drive[0].depth, after[0].q, there, rocks, finger)
+            find_forces(settings, code, drive, after, there, now)
+            left = _judged(settings, code, shape, drive, state, around, after, there, now)
+            if left < np.inf:
+                if len(balances) and left <= settings[0].balanced * torque:
+                    balances[count], arounds_there[count], forces[count] = (
+                        after[0],
+                        there[0],
+                        now[0],
+                    )
+                    count += 1
+                walk.s = state[0].s
+                state, after, around, there = after, state, there, around
+            ends = walk.step >= settings[0].most_increments
+        states[finger], arounds[finger] = state[0], around[0]
+        finger += 1 if ends else 0
+    return finger, count

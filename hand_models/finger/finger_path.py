@@ -106,7 +106,7 @@ def opening_paths(
     fingers : sequence of SettledFinger, length n
         As they have closed.
     """
-    from hand_models.finger.closing import around_rock
+    from hand_models.finger.around import around_rock
 
     shape, rock, drive = _around(model, closings)
     q = np.array([finger.joint_angles for finger in fingers])

@@ -28,6 +28,7 @@ __all__ = [
     "SETTINGS_RECORD",
     "SHAPE_FIELDS",
     "STATE_FIELDS",
+    "WALK_FIELDS",
     "Balanced",
     "OpenFinger",
     "Record",
@@ -35,6 +36,7 @@ __all__ = [
     "drives",
     "held_share",
     "open_states",
+    "open_walks",
 ]
 
 JOINT_COUNT: Final = len(PHALANGES)
@@ -127,6 +129,16 @@ the joints in the last increment [rad]. ``left``: torque residual that the linea
 after it [N·m].
 """
 
+WALK_FIELDS: Final = np.dtype(
+    [*((name, int) for name in ("step", "still", "slow", "rests")), ("s", float)]
+)
+"""How far a finger's path has been followed.
+
+``step``: number of increments; ``still``, ``slow``: of those last in a row at one tension, and with
+much damping. ``rests``: whether the finger has come to rest. ``s``: path parameter of the state
+before the last one, or of the one that was tried in vain since [N].
+"""
+
 
 class Balanced(NamedTuple):
     """A finger in balance on its path: arrays of one record each.
@@ -211,6 +223,13 @@ def open_states(q: Array) -> Records:
     found["q"], found["stride"] = q, SETTINGS.first_stride
     found["mode"], found["spines"] = CONTACT_CODES.off, CONTACT_CODES.caught
     found["least"], found["touches"] = np.inf, np.nan
+    return found
+
+
+def open_walks(states: Records) -> Records:
+    """Return how far paths that begin with n states have been followed, of `WALK_FIELDS`."""
+    found = np.zeros(len(states), WALK_FIELDS)
+    found["s"] = states["s"]
     return found
 
 

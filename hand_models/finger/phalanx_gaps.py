@@ -20,16 +20,18 @@ the rock that the point stands for: the place changes without a jump.
 
 from __future__ import annotations
 
-import cmath
 import math
 
 import numpy as np
 
 from hand_models.base import Array, Indices, compiled
-from hand_models.finger.path_state import AROUND_FIELDS, SETTINGS_RECORD, SHAPE_FIELDS, Record
+from hand_models.finger.path_state import SETTINGS_RECORD, SHAPE_FIELDS, Record
 from hand_models.sections import Complexes, Flags
 
-__all__ = ["near_points", "phalanx_beside", "put_around", "rock_distances"]
+__all__ = ["near_points", "phalanx_beside"]
+
+Blocks = tuple[Complexes, Array, Complexes, Array, Array]
+"""Rows of `Outlines`: its centres, radii, halves, thick and longest."""
 
 
 @compiled()
@@ -39,23 +41,31 @@ def _size(way: complex) -> float:
 
 
 @compiled()
-def _from_line(
-    places: Complexes, joint: complex, u: complex, start: float, end: float, height: float
-) -> Array:
-    """Return the distances of places from a line along a phalanx at a height, from start to end."""
-    away = np.empty(len(places))
-    for i in range(len(places)):
-        x, z = places[i].real - joint.real, places[i].imag - joint.imag
-        along, above = x * u.real + z * u.imag, z * u.real - x * u.imag - height
-        along -= min(max(along, start), end)
-        away[i] = math.sqrt(along * along + above * above)
-    return away
+def _off_line(
+    place: complex, joint: complex, u: complex, start: float, end: float, height: float
+) -> float:
+    """Return the distance of a place from a line along a phalanx at a height, from start to end."""
+    x, z = place.real - joint.real, place.imag - joint.imag
+    along, above = x * u.real + z * u.imag, z * u.real - x * u.imag - height
+    along -= min(max(along, start), end)
+    return math.sqrt(along * along + above * above)
 
 
 @compiled()
 def _from_tile(shape: Record, seen: complex, lift: float) -> complex:
     """Return the way to a point from the axis under the tile."""
     return seen - complex(min(max(seen.real, shape.near), shape.far), lift)
+
+
+@compiled()
+def _from_tip(shape: Record, seen: complex, lift: float) -> complex:
+    """Return the way to a point from the axis beyond the tile."""
+    corner, step = complex(shape.far, lift), complex(shape.end - shape.far, -lift)
+    square = step.real * step.real + step.imag * step.imag
+    beyond, part = seen - corner, 0.0
+    if square > 0.0:
+        part = min(max((beyond * step.conjugate()).real / square, 0.0), 1.0)
+    return beyond - part * step
 
 
 @compiled()
@@ -69,12 +79,7 @@ def _from_axis(shape: Record, seen: complex, bare: bool) -> tuple[complex, float
     distance = from_tile = _size(away)
     # a point over the tile is nearest to it
     if seen.real > shape.far or seen.imag < lift:
-        corner, step = complex(shape.far, lift), complex(shape.end - shape.far, -lift)
-        square = step.real * step.real + step.imag * step.imag
-        beyond, part = seen - corner, 0.0
-        if square > 0.0:
-            part = min(max((beyond * step.conjugate()).real / square, 0.0), 1.0)
-        beyond -= part * step
+        beyond = _from_tip(shape, seen, lift)
         other = _size(beyond)
         if other < distance:
             away, distance = beyond, other
@@ -88,23 +93,40 @@ def _alone(shape: Record, length: float) -> float:
 
 
 @compiled()
-def _level(settings: Record, shape: Record, depths: Array, lengths: Array, first: int) -> float:
-    """Return the level h to which the bed sinks [m]; ``first``: index of the least depth."""
+def _level(settings: Record, shape: Record, depths: Array, lengths: Array) -> float:
+    """Return the level h to which the bed sinks [m]."""
     # ‖√w max(0, h − g)‖ is convex in it
-    root = shape.fine * math.sqrt(shape.length)
-    level = depths[first] + _alone(shape, lengths[first])
+    root, first = shape.fine * math.sqrt(shape.length), np.argmin(depths)
+    alone = _alone(shape, lengths[first])
+    level = depths[first] + alone
+    # no higher than with the nearest point alone: those beyond do not count
+    most = level if alone < shape.far else math.inf
+    pressed, count = np.empty((len(depths), 2)), 0
+    for i in range(len(depths)):
+        pressed[count, 0], pressed[count, 1] = depths[i], lengths[i]
+        count += 1 if depths[i] <= most else 0
     for _ in range(20):
         loads, energy = 0.0, 0.0
-        for i in range(len(depths)):
-            sunk = max(level - depths[i], 0.0)
-            loads += lengths[i] * sunk
-            energy += lengths[i] * sunk * sunk
+        for i in range(count):
+            sunk = max(level - pressed[i, 0], 0.0)
+            loads += pressed[i, 1] * sunk
+            energy += pressed[i, 1] * sunk * sunk
         norm = math.sqrt(energy)
         step = (root - norm) * norm / max(loads, 1e-30)
         if abs(step) <= settings.sum_rounding * shape.far:
             break
         level += step
     return float(level)
+
+
+@compiled()
+def _fall(points: Complexes, lengths: Array, bare: Flags, depths: Array, i: int) -> float:
+    """Return by how much rock half way to the points next to one is less deep, at most [m]."""
+    fall = 0.0
+    for k in range(max(i - 1, 0), min(i + 2, len(points))):
+        if bare[k] == bare[i] and _size(points[k] - points[i]) < 1.5 * lengths[i]:
+            fall = max(fall, 0.5 * (depths[i] - depths[k]))
+    return fall
 
 
 @compiled("c1", "f1", "b1", SETTINGS_RECORD.dtype, SHAPE_FIELDS, "c0", "c0", "f0")
@@ -117,7 +139,7 @@ def phalanx_beside(
     joint: complex,
     u: complex,
     depth: float,
-) -> tuple[float, float, complex, complex]:
+) -> tuple[float, float, complex, complex, Array, Array]:
     """Return gap, and place and direction of the contact force, of a phalanx beside rock.
 
     Parameters
@@ -143,44 +165,99 @@ def phalanx_beside(
     place, push : complex
         Place where the contact's force acts [m], and its unit vector toward the rock, in the
         phalanx's axes: real part along it from its joint, imaginary part toward the rock.
+    depths, tile_depths : ndarray, shape (p,)
+        Distance of each point from the bar, and from under the tile less the bar's radius, infinite
+        for bare frames [m].
     """
-    settings, shape = settings[0], shape[0]
-    ways, depths = np.empty_like(points), np.empty_like(lengths)
-    tile_gap, first, back = math.inf, 0, u.conjugate()
-    for i in range(len(points)):
+    settings, shape, back, count = settings[0], shape[0], u.conjugate(), len(points)
+    ways, depths, tile_depths = np.empty(count, np.complex128), np.empty(count), np.empty(count)
+    for i in range(count):
         ways[i], away, from_tile = _from_axis(shape, (points[i] - joint) * back, bare[i])
-        depths[i] = away - shape.radius
-        tile_gap = min(tile_gap, from_tile - shape.radius)
-        if depths[i] < depths[first]:
-            first = i
-    gap = _level(settings, shape, depths, lengths, first) - shape.fine
+        depths[i], tile_depths[i] = away - shape.radius, from_tile - shape.radius
+    gap = _level(settings, shape, depths, lengths) - shape.fine
     tiny = 1e-30  # divides what is zero
-    total, place, push = 0.0, 0.0j, 0.0j
-    for i in range(len(points)):
-        # pressure falls evenly along the rock that the point stands for, from its deeper end
-        sunk, fall = gap + depth - depths[i], 0.0
-        for k in range(max(i - 1, 0), min(i + 2, len(points))):
-            if bare[k] == bare[i] and _size(points[k] - points[i]) < 1.5 * lengths[i]:
-                fall = max(fall, 0.5 * (depths[i] - depths[k]))
-        if abs(sunk) < fall:
-            sunk = (sunk + fall) ** 2 / (4.0 * fall)
+    # numbers one by one: compiled products with complex numbers take twice as long
+    total, along, above, push_s, push_t, last = 0.0, 0.0, 0.0, 0.0, 0.0, count - 1
+    for i in range(count):
+        sunk, beside = gap + depth - depths[i], min(depths[max(i - 1, 0)], depths[min(i + 1, last)])
+        if abs(sunk) < 0.5 * (depths[i] - beside):
+            # pressure falls evenly along the rock that the point stands for, from its deeper end
+            fall = _fall(points, lengths, bare, depths, i)
+            if abs(sunk) < fall:
+                sunk = (sunk + fall) ** 2 / (4.0 * fall)
         if sunk > 0.0:
-            pressed = sunk * lengths[i]
-            out = ways[i] / max(depths[i] + shape.radius, tiny)
+            pressed, away = sunk * lengths[i], max(depths[i] + shape.radius, tiny)
+            s, t, seen = ways[i].real / away, ways[i].imag / away, (points[i] - joint) * back
             total += pressed
-            place += pressed * ((points[i] - joint) * back - ways[i] + shape.radius * out)
-            push += pressed * out
-    return gap, tile_gap, place / max(total, tiny), push / max(_size(push), tiny)
+            along += pressed * (seen.real - ways[i].real + shape.radius * s)
+            above += pressed * (seen.imag - ways[i].imag + shape.radius * t)
+            push_s += pressed * s
+            push_t += pressed * t
+    push, total = complex(push_s, push_t), max(total, tiny)
+    place, push = complex(along / total, above / total), push / max(_size(push), tiny)
+    return gap, tile_depths.min(), place, push, depths, tile_depths
 
 
-@compiled("c1", "f1", "b1", "c1", "f1", "f1", SHAPE_FIELDS, "c0", "c0", "f0")
+@compiled()
+def _less(
+    shape: Record, least: tuple[float, float], away: float, off_tile: float, length: float
+) -> tuple[float, float]:
+    """Return how low a bed sinks and how near the tile is, at most, with one point more."""
+    axis, tile = least
+    if away < axis:
+        axis = min(axis, away + _alone(shape, length))
+    return axis, min(tile, off_tile)
+
+
+@compiled()
+def _most(least: tuple[float, float], within: float) -> tuple[float, float]:
+    """Return distances from the axis and from under the tile up to which points count [m]."""
+    return least[0] + within, least[1] + within if least[1] < math.inf else -math.inf
+
+
+@compiled()
+def _look(
+    points: Complexes,
+    bare: Flags,
+    lengths: Array,
+    begin: int,
+    count: int,
+    shape: Record,
+    joint: complex,
+    u: complex,
+    least: tuple[float, float],
+) -> tuple[float, float]:
+    """Return how low a bed sinks and how near the tile is, at most, with some points more."""
+    for i in range(begin, begin + count):
+        _, away, off_tile = _from_axis(shape, (points[i] - joint) * u.conjugate(), bare[i])
+        least = _less(shape, least, away, off_tile, lengths[i])
+    return least
+
+
+@compiled()
+def _nearest(
+    shape: Record, seen: complex, half: complex, thick: float, bare: bool
+) -> tuple[float, float]:
+    """Return bounds below the distances of a block of rock from the axis and from under the tile.
+
+    The distance from a straight part of the axis grows, along any line, by no less than with the
+    slope that it has at a place: for a block that lies along the axis it hardly falls.
+    """
+    lift, least, of_tile = 0.0 if bare else shape.lift, math.inf, math.inf
+    for way in (_from_tip(shape, seen, lift), _from_tile(shape, seen, lift)):
+        away = _size(way)
+        slope = abs(way.real * half.real + way.imag * half.imag) / max(away, 1e-30)
+        of_tile = away - (slope if away > 0.0 else _size(half)) - thick
+        least = min(least, of_tile)
+    return least, math.inf if bare else of_tile
+
+
+@compiled("c1", "f1", "b1", "c1 f1 c1 f1 f1", SHAPE_FIELDS, "c0", "c0", "f0")
 def near_points(
     points: Complexes,
     lengths: Array,
     bare: Flags,
-    centres: Complexes,
-    radii: Array,
-    longest: Array,
+    blocks: Blocks,
     shape: Record,
     joint: complex,
     u: complex,
@@ -190,211 +267,62 @@ def near_points(
 
     Parameters
     ----------
-    points, lengths, bare, centres, radii, longest : ndarray
+    points, lengths, bare : ndarray
         Rock in the finger's plane, a row of `Outlines`.
+    blocks : tuple of ndarray
+        `Blocks` of these points.
     shape, joint, u
         As of `phalanx_beside`.
     within : float
         Margin: the tile's depth and the largest further motion [m].
     """
+    centres, radii, halves, thick, longest = blocks
     shape, back, count = shape[0], u.conjugate(), len(centres)
-    each, within = len(points) // count, within + longest.max()
-    whole = _from_line(centres, joint, u, shape.near, shape.end, 0.0)
-    # the nearest rock under the tiles bounds what is looked at
-    first = np.where(bare[::each], math.inf, whole + radii).argmin()
-    nearest, seen = whole[first] + radii[first], (centres[first] - joint) * back
-    most = nearest + shape.lift + _alone(shape, longest[first])
-    most_tile = _size(_from_tile(shape, seen, shape.lift)) + radii[first]
-    found = np.empty(len(points), np.intp)
-    size, from_tile = np.empty_like(lengths), np.empty_like(lengths)
-    # the bed sinks no lower than with any point alone
-    least, least_tile, taken = math.inf, math.inf, 0
-    for block in range(count):
-        if whole[block] - radii[block] - shape.lift > max(most, most_tile) + within:
-            continue
-        begin, end = block * each, block * each + each
-        seen = (centres[block] - joint) * back
-        radius = radii[block] + (shape.lift if bare[begin] != bare[end - 1] else 0.0)
-        _, away, off_tile = _from_axis(shape, seen, bare[begin])
-        most = min(most, away + radius + _alone(shape, longest[block]))
-        most_tile = min(most_tile, off_tile + radius)
-        if away - radius > most + within and off_tile - radius > most_tile + within:
-            continue
-        for i in range(begin, end):
-            seen = (points[i] - joint) * back
-            _, size[taken], from_tile[taken] = _from_axis(shape, seen, bare[i])
-            found[taken] = i
-            if size[taken] < least:
-                least = min(least, size[taken] + _alone(shape, lengths[i]))
-            least_tile = min(least_tile, from_tile[taken])
-            taken += 1
-    kept = 0
-    for i in range(taken):
-        if size[i] <= least + within or from_tile[i] <= least_tile + within:
+    each, long = len(points) // count, 0.0
+    # blocks by the least distance that they may have from the bar as if it had no lift; the nearest
+    # of those under tiles bounds which of them are looked at, and the nearest of these which points
+    bound, first, low = np.empty(count), 0, math.inf
+    for i in range(count):
+        away = _off_line(centres[i], joint, u, shape.near, shape.end, 0.0)
+        bound[i], long = away - radii[i] - shape.lift, max(long, longest[i])
+        if away + radii[i] < low and not bare[i * each]:
+            first, low = i, away + radii[i]
+    within, nothing = within + long, (math.inf, math.inf)
+    least = _look(points, bare, lengths, first * each, each, shape, joint, u, nothing)
+    axis, tile, which = np.empty(count), np.empty(count), np.empty(count, np.intp)
+    looked, low, low_tile, under, most = 0, math.inf, math.inf, first, _most(least, within)
+    for i in range(count):
+        if bound[i] <= max(most[0], most[1]):
+            begin, half = i * each, halves[i] * back
+            axis[looked], tile[looked] = _nearest(
+                shape, (centres[i] - joint) * back, half, thick[i], bare[begin]
+            )
+            # on a block that stands for next to nothing the bed sinks far
+            if axis[looked] + radii[i] < low and longest[i] > 0.01 * long:
+                first, low = i, axis[looked] + radii[i]
+            if tile[looked] + radii[i] < low_tile:
+                under, low_tile = i, tile[looked] + radii[i]
+            # a block of both kinds
+            axis[looked] -= shape.lift if bare[begin] != bare[begin + each - 1] else 0.0
+            which[looked] = i
+            looked += 1
+    for i in (first, under):
+        least = _look(points, bare, lengths, i * each, each, shape, joint, u, least)
+    found, total = np.empty(looked * each, np.intp), 0
+    size, from_tile = np.empty(looked * each), np.empty(looked * each)
+    for k in range(looked):
+        most = _most(least, within)
+        if axis[k] <= most[0] or tile[k] <= most[1]:
+            for i in range(which[k] * each, which[k] * each + each):
+                _, size[total], from_tile[total] = _from_axis(
+                    shape, (points[i] - joint) * back, bare[i]
+                )
+                least = _less(shape, least, size[total], from_tile[total], lengths[i])
+                found[total] = i
+                total += 1
+    most, kept = _most(least, within), 0
+    for i in range(total):
+        if size[i] <= most[0] or from_tile[i] <= most[1]:
             found[kept] = found[i]
             kept += 1
     return found[:kept]
-
-
-@compiled("c1", "c1", "c1", "f1", "i0")
-def rock_distances(
-    places: Complexes, points: Complexes, centres: Complexes, radii: Array, each_place: int
-) -> Array:
-    """Return the distance of each of m places from the nearest point of rock, shape (m,) [m].
-
-    Parameters
-    ----------
-    places : ndarray of complex, shape (m,)
-        x + i z [m].
-    points, centres, radii : ndarray
-        Rock in the finger's plane, a row of `Outlines`.
-    each_place : int
-        1 for the distance of each place; 0, much faster, for a result whose last number is the
-        least distance of all places.
-    """
-    found = np.full(len(places), math.inf)
-    each = len(points) // len(centres)
-    for k in range(len(places)):
-        if k and not each_place:
-            found[k] = found[k - 1]
-        for block in range(len(centres)):
-            if _size(centres[block] - places[k]) - radii[block] < found[k]:
-                for i in range(block * each, block * each + each):
-                    found[k] = min(found[k], _size(points[i] - places[k]))
-    return found
-
-
-@compiled()
-def _engaged(settings: Record, gap: float, travel: float, exponent: float) -> float:
-    """Return the share of spines that reach the rock, as `hand_models.tile.engaged_share` does."""
-    if gap <= 0.0:
-        return 1.0
-    share = 1.0 - (gap / travel) ** exponent if gap < travel else 0.0
-    return share if share > settings.least_share else 0.0
-
-
-@compiled()
-def _on_rock(
-    places: Complexes,
-    ways: Complexes,
-    behind: Array,
-    near: Indices,
-    across: Array,
-    settings: Record,
-    shape: Record,
-    joint: complex,
-    u: complex,
-    tile_gap: float,
-) -> tuple[float, float]:
-    """Return the share of a tile's spines that reach the rock, and the middle of these [m]."""
-    strips = len(across)
-    if strips == 1:
-        share = _engaged(settings, tile_gap, shape.travel, shape.exponent)
-        return share, across[0] * share / max(share, settings.sum_rounding)
-    if tile_gap >= shape.travel:
-        return 0.0, 0.0
-    away = _from_line(places[near], joint, u, shape.near, shape.far, shape.lift)
-    least, farther, back = away.min(), np.full(strips, math.inf), u.conjugate()
-    for i in range(len(near)):
-        # no spine reaches beyond its travel
-        if away[i] - least + tile_gap < shape.travel:
-            place, way = (places[near[i]] - joint) * back, ways[near[i]] * back
-            for k in range(strips):
-                depth = behind[near[i], k]
-                above = place.imag + depth * way.imag - shape.lift
-                if depth < math.inf and above < farther[k]:
-                    along = place.real + depth * way.real
-                    along -= min(max(along, shape.near), shape.far)
-                    farther[k] = min(farther[k], math.sqrt(along * along + above * above))
-    total, middle = 0.0, 0.0
-    for k in range(strips):
-        part = _engaged(settings, tile_gap + (farther[k] - least), shape.travel, shape.exponent)
-        total += part
-        middle += part * across[k]
-    return total / strips, middle / max(total, settings.sum_rounding)
-
-
-@compiled(
-    *(SETTINGS_RECORD.dtype, SHAPE_FIELDS, "f1", "f1", AROUND_FIELDS),
-    *("c1", "f1", "c1", "f1", "f1", "b1", "c1", "c1", "f2", "f1"),
-)
-def put_around(
-    settings: Record,
-    shape: Record,
-    depth: Array,
-    q: Array,
-    found: Record,
-    points: Complexes,
-    lengths: Array,
-    centres: Complexes,
-    radii: Array,
-    longest: Array,
-    bare: Flags,
-    places: Complexes,
-    ways: Complexes,
-    behind: Array,
-    across: Array,
-) -> None:
-    """Write gaps, engagement and lever arms at joint angles, and their finite differences.
-
-    Parameters
-    ----------
-    settings, shape : record
-        `FingerSettings` and `PhalanxShape`.
-    depth : ndarray, shape (3,)
-        Depth to which each tile is pressed into its bed of springs [m].
-    q : ndarray, shape (3,)
-        Joint angles [rad].
-    found : record of `AROUND_FIELDS`
-        Result, written over.
-    points, lengths, centres, radii, longest, bare, places, ways, behind, across : ndarray
-        Rock in the finger's plane, a row of `Outlines`.
-    """
-    count, turn, bar, found = len(q), settings[0].derivative_turn, shape[0], found[0]
-    joints = np.zeros((count + 1, count), np.complex128)
-    u = np.zeros_like(joints)
-    # as it stands, and with each joint in turn by a small step
-    for pose in range(count + 1):
-        angle, joint = 0.0, 0.0j
-        for j in range(count):
-            angle += q[j] + (turn if pose == j + 1 else 0.0)
-            joints[pose, j], u[pose, j] = joint, cmath.exp(1j * angle)
-            joint += bar.end * u[pose, j]
-    for j in range(count):
-        # two points may come nearer to each other by the way of each
-        within = depth[j] + turn * 2.0 * count * (bar.end + bar.radius + depth[j])
-        near = near_points(
-            points, lengths, bare, centres, radii, longest, shape, joints[0, j], u[0, j], within
-        )
-        near_at, near_lengths, near_bare = points[near], lengths[near], bare[near]
-        strips = np.empty(0, np.intp)
-        # by the joints before it and its own
-        for pose in range(j + 2):
-            joint, along = joints[pose, j], u[pose, j]
-            gap, tile_gap, place, push = phalanx_beside(
-                near_at, near_lengths, near_bare, settings, shape, joint, along, depth[j]
-            )
-            reach = bar.travel - tile_gap + within
-            if pose == 0 and reach > 0.0 and len(across) > 1:
-                away = _from_line(places, joint, along, bar.near, bar.far, bar.lift)
-                strips = np.flatnonzero(away <= away.min() + reach)
-            share, middle = _on_rock(
-                places, ways, behind, strips, across, settings[0], bar, joint, along, tile_gap
-            )
-            # a phalanx that presses aside, with its end, has its spines beside the rock
-            share = _engaged(settings[0], 1.0 - share * push.imag, 1.0, 1.0)
-            if pose == 0:
-                found.gap[j], found.share[j] = gap, share
-                found.place[j], found.push[j], found.across[j] = place, push, middle
-            else:
-                found.d_gap[j, pose - 1] = (gap - found.gap[j]) / turn
-                found.d_share[j, pose - 1] = (share - found.share[j]) / turn
-            for i in range(j + 1):
-                # from joint i to contact j, in the axes of its force
-                arm = joint + place * along - joints[pose, i]
-                arm *= (push * along).conjugate()
-                if pose == 0:
-                    found.a[i, j], found.b[i, j] = -arm.real, -arm.imag
-                else:
-                    found.d_a[i, j, pose - 1] = (-arm.real - found.a[i, j]) / turn
-                    found.d_b[i, j, pose - 1] = (-arm.imag - found.b[i, j]) / turn

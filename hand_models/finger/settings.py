@@ -35,6 +35,9 @@ class FingerSettings:
     """Largest number of increments on a path, and the number above which a path is long. Of
     9,940 fingers on rough walls that come to rest nine took more than 400, and one more than
     900."""
+    increments_at_once: int = 400
+    """Number of increments, of one finger after the other, after which long work is looked at:
+    some 10 ms."""
     most_tension: float = 2.0 / 37.0
     most_lowering: float = 0.5 / 37.0
     """Largest growth of the tension in an increment of closing, and fall in one of opening."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ __all__ = ["Outlines"]
 class Outlines(NamedTuple):
     """Points on the rock in the planes of n fingers: p points for each, in blocks of 16.
 
-    Fingers with fewer points are filled up with points 1 km away.
+    Fingers with fewer points, or places of strips, are filled up with some 1 km away.
 
     Attributes
     ----------
@@ -32,24 +32,45 @@ class Outlines(NamedTuple):
         Centre of a bounding circle of each block [m].
     radii : ndarray, shape (n, p / 16)
         Radius of that circle [m].
+    halves : ndarray of complex, shape (n, p / 16)
+        Vector along each block from its centre, as long as it goes to either side [m].
+    thick : ndarray, shape (n, p / 16)
+        How far its points are beside the line along that vector, at most [m].
     longest : ndarray, shape (n, p / 16)
         Largest of the lengths in each block [m].
     bare : ndarray of bool, shape (n, p)
         True for rock that the bare frame meets, beside the tiles, and for what fills up.
     places, ways, behind, across : ndarray, shapes (n, c), (n, c), (n, c, k) and (n, k)
         Rock in the strips across each finger's tiles, as in `RockStrips`.
+    place_centres, place_radii : ndarray, shape (n, c / 16)
+        Centre and radius of a bounding circle of each block of 16 places [m].
     """
 
     points: Complexes
     lengths: Array
     centres: Complexes
     radii: Array
+    halves: Complexes
+    thick: Array
     longest: Array
     bare: Flags
     places: Complexes
     ways: Complexes
     behind: Array
     across: Array
+    place_centres: Complexes
+    place_radii: Array
+
+    @property
+    def arrays(self) -> tuple[Any, ...]:
+        """Return these arrays as compiled functions take them, those of a kind together."""
+        return (
+            (self.points, self.lengths, self.bare),
+            (self.centres, self.radii, self.halves, self.thick, self.longest),
+            (self.places, self.ways, self.behind),
+            (self.place_centres, self.place_radii),
+            self.across,
+        )
 
     @classmethod
     def of(cls, rocks: Sequence[FingerRock], reach: float, spacing: float) -> Outlines:
@@ -63,6 +84,8 @@ class Outlines(NamedTuple):
         spacing : float
             Largest distance between neighbouring points [m].
         """
+        from hand_models.sections.compiled_outlines import bounds_of_blocks
+
         block = SECTION_SETTINGS.points_per_circle
         taken = []
         for rock in rocks:
@@ -80,7 +103,8 @@ class Outlines(NamedTuple):
             bare[i, len(under[0]) :] = True
         strips = [rock.strips for rock in rocks]
         k = max(len(each.across) for each in strips)
-        places = np.full((len(rocks), max([1, *(len(each.places) for each in strips)])), 1e3 + 0j)
+        in_blocks = math.ceil(max([1, *(len(each.places) for each in strips)]) / block)
+        places = np.full((len(rocks), in_blocks * block), 1e3 + 0j)
         ways, behind, across = (
             np.ones_like(places),
             np.zeros((*places.shape, k)),
@@ -91,11 +115,26 @@ class Outlines(NamedTuple):
             places[i, there], ways[i, there] = each.places, each.ways
             behind[i, there] = each.behind
             across[i] = each.across
-        in_blocks = points.reshape(len(taken), blocks, block)
-        centres = in_blocks.mean(axis=-1)
-        radii = np.abs(in_blocks - centres[..., None]).max(axis=-1)
-        longest = lengths.reshape(in_blocks.shape).max(axis=-1)
-        return cls(points, lengths, centres, radii, longest, bare, places, ways, behind, across)
+        longest = lengths.reshape(len(taken), blocks, block).max(axis=-1)
+        bounds, circles = bounds_of_blocks(points, block), bounds_of_blocks(places, block)[:2]
+        strips_of = places, ways, behind, across
+        return cls(points, lengths, *bounds, longest, bare, *strips_of, *circles)
+
+    def distances(self, places: Complexes) -> Array:
+        """Return the distance of each of m places from the nearest point of a single finger's rock.
+
+        ``places``: s + i t, shape (m,) [m].
+        """
+        from hand_models.sections.compiled_outlines import rock_distances
+
+        return rock_distances(places, self.points[0], self.centres[0], self.radii[0], 1)
+
+    def least_distance(self, places: Complexes) -> float:
+        """Return the least of `distances`, which takes much less time than all of them [m]."""
+        from hand_models.sections.compiled_outlines import rock_distances
+
+        sides = self.points[0], self.centres[0], self.radii[0]
+        return float(rock_distances(places, *sides, 0)[-1])
 
 
 def _standing_out(rock: FingerRock, reach: float, spacing: float) -> tuple[Complexes, Array]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from hand_models.finger.closing import around_rock
+from hand_models.finger.around import around_rock
 from hand_models.finger.model import FingerModel
 from hand_models.finger.path_state import OpenFinger, drives
 from hand_models.finger.phalanx_shape import PhalanxShape, fan_out

@@ -35,7 +35,7 @@ def beside(
     found, bar = [], shape.record
     for i, where in enumerate(zip(*(each.ravel().tolist() for each in places), strict=True)):
         own = sides if near is None else [values[near[i]] for values in sides]
-        found.append(phalanx_beside(*own, SETTINGS_RECORD, bar, *where))
+        found.append(phalanx_beside(*own, SETTINGS_RECORD, bar, *where)[:4])
     return Phalanges(*(np.reshape(values, np.shape(u)) for values in zip(*found, strict=True)))
 
 
@@ -47,7 +47,7 @@ def points_near(
     within: np.ndarray,
 ) -> list[np.ndarray]:
     """Return the points of its rock on which each phalanx of a finger depends."""
-    names = ("points", "lengths", "bare", "centres", "radii", "longest")
-    own, bar = [getattr(rock, name)[0] for name in names], shape.record
+    points, blocks = (tuple([each[0] for each in kind]) for kind in rock.arrays[:2])
+    bar = shape.record
     places = zip(joints.tolist(), u.tolist(), within.tolist(), strict=True)
-    return [near_points(*own, bar, *where) for where in places]
+    return [near_points(*points, blocks, bar, *where) for where in places]
