@@ -30,31 +30,52 @@ def _from_segment(vertices: Array, at: int, s: float, t: float) -> tuple[float, 
 def _blocks(vertices: Array, ends: Indices) -> tuple[Indices, Array, Array]:
     """Return blocks of up to 16 neighbouring segments of polylines, in their order.
 
-    They are the first segment of each of b blocks and the one after its last, (b, 2); a circle
-    about them, (b, 3): its centre and radius, rounded up [m]; and their longest, (b,) [m].
+    They are the first segment of each of b blocks and the one after its last, (b, 2); a box about
+    them, (b, 6): its centre, the unit vector from the first to the last point, half its length
+    along that and across, rounded up [m]; and their longest segment, (b,) [m].
     """
     each, count, begin = 16, 0, 0
     for end in ends:
         count += (end - begin + each - 2) // each
         begin = end
-    spans, circles = np.empty((count, 2), dtype=np.intp), np.empty((count, 3))
+    spans, boxes = np.empty((count, 2), dtype=np.intp), np.empty((count, 6))
     longest, block, begin = np.full(count, 1e-9), 0, 0
     for end in ends:
         for first in range(begin, end - 1, each):
             after = min(first + each, end - 1)
-            (left, low), (right, high) = vertices[first], vertices[first]
+            s, t = vertices[first]
+            u, v = vertices[after, 0] - s, vertices[after, 1] - t
+            size = math.sqrt(u * u + v * v)
+            u, v = (u / size, v / size) if size > 0.0 else (1.0, 0.0)
+            back, far, low, high = 0.0, 0.0, 0.0, 0.0
             for i in range(first, after):
-                s, t = vertices[i + 1]
-                left, right, low, high = min(left, s), max(right, s), min(low, t), max(high, t)
-                x, y = s - vertices[i, 0], t - vertices[i, 1]
+                x, y = vertices[i + 1, 0] - s, vertices[i + 1, 1] - t
+                along, across = x * u + y * v, y * u - x * v
+                back, far, low, high = (
+                    *(min(back, along), max(far, along)),
+                    *(min(low, across), max(high, across)),
+                )
+                x, y = vertices[i + 1, 0] - vertices[i, 0], vertices[i + 1, 1] - vertices[i, 1]
                 longest[block] = max(longest[block], math.sqrt(x * x + y * y))
             spans[block, 0], spans[block, 1] = first, after
-            circles[block, 0], circles[block, 1] = 0.5 * (left + right), 0.5 * (low + high)
-            size = math.sqrt((right - left) ** 2 + (high - low) ** 2)
-            circles[block, 2] = 0.5 * size + 1e-12 * (size + abs(left) + abs(low)) + 1e-15
+            along, across = 0.5 * (back + far), 0.5 * (low + high)
+            boxes[block, 0], boxes[block, 1] = s + along * u - across * v, t + along * v + across * u
+            boxes[block, 2], boxes[block, 3] = u, v
+            more = 1e-12 * (far - back + high - low + abs(s) + abs(t)) + 1e-15
+            boxes[block, 4], boxes[block, 5] = 0.5 * (far - back) + more, 0.5 * (high - low) + more
             block += 1
         begin = end
-    return spans, circles, longest
+    return spans, boxes, longest
+
+
+@compiled()
+def _beside_box(boxes: Array, block: int, s: float, t: float) -> float:
+    """Return the square of the distance of a point from the box about a block [m²]."""
+    x, y = s - boxes[block, 0], t - boxes[block, 1]
+    u, v = boxes[block, 2], boxes[block, 3]
+    along = max(abs(x * u + y * v) - boxes[block, 4], 0.0)
+    across = max(abs(y * u - x * v) - boxes[block, 5], 0.0)
+    return along * along + across * across
 
 
 @compiled("f2", "i1", "f2")
@@ -77,19 +98,25 @@ def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Ind
     away : ndarray, shape (n, 2)
         Vector (s, t) from that place to the point [m].
     """
-    spans, circles, longest = _blocks(vertices, ends)
+    spans, boxes, longest = _blocks(vertices, ends)
     segments, parts = np.zeros(len(points), dtype=np.intp), np.zeros(len(points))
-    away = np.empty((len(points), 2))
-    nearest = 0
+    away, nearest, near, count = np.empty((len(points), 2)), 0, np.empty(len(spans), np.intp), 0
+    # points follow each other: blocks that may have what is nearest to one are so for those that
+    # are no farther from it than this
+    reach, s_0, t_0, far = 8.0 * longest.max(), math.inf, math.inf, 0.0  # [m]
     for i in range(len(points)):
         s, t = points[i]
         # the segment nearest to the point before is near to this one
         _, x, y = _from_segment(vertices, nearest, s, t)
         least = math.sqrt(x * x + y * y) * (1.0 + 1e-12) + 1e-15  # [m] it is found once more
-        square = math.inf
-        for block in range(len(spans)):
-            x, y = s - circles[block, 0], t - circles[block, 1]
-            if x * x + y * y > (least + circles[block, 2]) ** 2:
+        moved, square = math.sqrt((s - s_0) ** 2 + (t - t_0) ** 2), math.inf
+        if least > far - moved:
+            s_0, t_0, far, count = s, t, least + 2.0 * reach, 0
+            for block in range(len(spans)):
+                near[count] = block
+                count += 1 if _beside_box(boxes, block, s, t) <= far * far else 0
+        for block in near[:count]:
+            if _beside_box(boxes, block, s, t) > least * least:
                 continue
             at, end = spans[block]
             while at < end:
@@ -149,11 +176,26 @@ def highest_rock(vertices: Array, ends: Indices, low: Array, high: Array) -> Arr
     ``vertices`` (p, 2) and ``ends``: points of the polylines [m], and the index at which each ends;
     ``low`` and ``high``, (n,): the windows low ≤ s ≤ high [m].
     """
+    # the bounds of pieces of up to 16 points, with the first point of what follows them
+    each, bounds, count, begin = 16, np.empty((len(vertices) // 16 + len(ends), 3)), 0, 0
+    spans = np.empty((len(bounds), 3), dtype=np.intp)
+    for end in ends:
+        for first in range(begin, end, each):
+            after = min(first + each, end)
+            own = vertices[first : min(after + 1, end)]
+            bounds[count, 0], bounds[count, 1] = own[:, 0].min(), own[:, 0].max()
+            bounds[count, 2] = own[:, 1].min()
+            spans[count, 0], spans[count, 1], spans[count, 2] = first, after, end
+            count += 1
+        begin = end
     least = np.full(len(low), math.inf)
     for i in range(len(low)):
-        begin = 0
-        for end in ends:
-            for at in range(begin, end):
+        for piece in range(count):
+            beside = bounds[piece, 1] < low[i] or bounds[piece, 0] > high[i]
+            if beside or bounds[piece, 2] >= least[i]:
+                continue
+            first, after, end = spans[piece]
+            for at in range(first, after):
                 s, t = vertices[at]
                 if low[i] <= s <= high[i]:
                     least[i] = min(least[i], t)
@@ -164,7 +206,6 @@ def highest_rock(vertices: Array, ends: Indices, low: Array, high: Array) -> Arr
                     if (s < bound) != (s_after < bound):
                         part = (bound - s) / (s_after - s)
                         least[i] = min(least[i], t + part * (t_after - t))
-            begin = end
     return least
 
 
