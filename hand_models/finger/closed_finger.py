@@ -242,7 +242,9 @@ def _straight(drive: Records) -> Array:
 
 
 def _some(rock: Outlines, fingers: Indices) -> Outlines:
-    """Return the rock under some of the fingers."""
+    """Return the rock under some of the fingers, without copying that under all of them."""
+    if len(fingers) == len(rock.points):
+        return rock
     return Outlines._make(values[fingers] for values in rock)
 
 

@@ -297,14 +297,14 @@ class OutlinedHold(Hold):
         plane, share = np.array([origin, s_axis, t_axis], dtype=float), _width_share(hidden, scale)
         # what is beside several outlines with overhangs belongs to none of them
         several = hidden > scale.bridged_gap and len(outlines) > 1
-        heights = self._heights(plane, size) if share > 0.0 and not several else None
+        seen = size._replace(strip=math.inf) if tiles_only else size  # no strips are asked for
+        heights = self._heights(plane, seen) if share > 0.0 and not several else None
         if heights is None:
             return FingerRock(self._smooth(middle))
         s, gap = scale.places, scale.bridged_gap
         own = compiled.least_heights(points, stops, s)
-        heights = heights._replace(
-            tile=np.minimum(heights.tile, own), frame=np.minimum(heights.frame, own)
-        )
+        tile, frame = (np.minimum(each, own) for each in (heights.tile, heights.frame))
+        heights = heights._replace(tile=tile, frame=frame)
         # and where the plane has no rock, that beside it has nothing to be moved to
         alone = np.hypot(s, heights.frame)[np.isinf(own)] < size.reach
         if share < 1.0 and alone.any():
@@ -319,11 +319,11 @@ class OutlinedHold(Hold):
             runs = compiled.raised_outlines(corners, s, own, least, ends, gap, slack)
             return self._smooth(unstrung(*runs))
 
-        tile = envelope(heights.tile, heights.tile_ends)
+        under = envelope(heights.tile, heights.tile_ends)
         if tiles_only:
-            return FingerRock(tile)
-        frame = envelope(heights.frame, heights.frame_ends)
-        return FingerRock(tile, frame, _strips(scale, size.strips, heights, tile, share))
+            return FingerRock(under)
+        beside = envelope(heights.frame, heights.frame_ends)
+        return FingerRock(under, beside, _strips(scale, size.strips, heights, under, share))
 
     def _smooth(self, runs: Sequence[Array]) -> PolylineSection | None:
         curves = [smooth(run, self._scale) for run in runs]

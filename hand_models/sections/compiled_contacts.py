@@ -15,6 +15,9 @@ from hand_models.sections.section import Flags
 
 __all__ = ["first_contacts", "pierced_faces"]
 
+Seen = tuple[Array, Array, float, float, float]
+"""Vertices, and joint, cosine, sine and height of a face beside them."""
+
 
 @compiled()
 def _order(x: float, y: float, rounding: float) -> float:
@@ -52,7 +55,7 @@ def _by_end(
     u, v = end / arm, height / arm
     # a segment that the end meets begins no farther from its circle than it is long
     nearest, farthest = max(arm - longest, 0.0) ** 2, (arm + longest) ** 2
-    first, turn, vertex = math.inf, math.inf, 0
+    first, there, vertex = math.inf, (0.0, 0.0), 0
     for i in range(len(near)):
         x, y, square = near[i]
         if i == lasts[i] or square < nearest or square > farthest:
@@ -69,8 +72,8 @@ def _by_end(
                 along, across = p * u + q * v, q * u - p * v
                 order = _order(along, across, rounding)
                 if order < first:
-                    first, turn, vertex = order, _angle(along, across, rounding), i + 1
-    return turn, vertex
+                    first, there, vertex = order, (along, across), i + 1
+    return _angle(there[0], there[1], rounding) if first < math.inf else math.inf, vertex
 
 
 @compiled()
@@ -78,31 +81,41 @@ def _on_face(
     near: Array, start: float, end: float, height: float, rounding: float
 ) -> tuple[float, int]:
     """Return by what angle a phalanx turns until a vertex is on its face, and the vertex."""
-    first, turn, vertex = math.inf, math.inf, 0
+    first, there, vertex = math.inf, (0.0, 0.0), 0
+    # rounding must leave none out
+    nearest, farthest = (1.0 - 1e-9) * max(start, 0.0) ** 2, (1.0 + 1e-9) * end * end
     for i in range(len(near)):
         x, y, square = near[i]
         beyond = square - height * height
-        if beyond < 0.0:
+        if beyond < nearest or beyond > farthest:
             continue
         along = math.sqrt(beyond)
         if start <= along <= end:
             p, q = x * along + y * height, y * along - x * height
             order = _order(p, q, rounding)
             if order < first:
-                first, turn, vertex = order, _angle(p, q, rounding), i
-    return turn, vertex
+                first, there, vertex = order, (p, q), i
+    return _angle(there[0], there[1], rounding) if first < math.inf else math.inf, vertex
+
+
+@compiled()
+def _on(seen: Seen, i: int) -> tuple[float, float]:
+    """Return how far along a face a vertex is, and how far off it [m]."""
+    vertices, joint, u, v, height = seen
+    s, t = vertices[i, 0] - joint[0], vertices[i, 1] - joint[1]
+    return s * u + t * v, t * u - s * v - height
 
 
 @compiled()
 def _reached(
-    on: Array, here: float, level: float, at: int, way: int, last: int, face: Array
+    on: Seen, here: float, level: float, at: int, way: int, last: int, face: Array
 ) -> float:
     """Return up to where along a face rock stays at it, on one side of a place.
 
     Parameters
     ----------
-    on : ndarray, shape (n, 3)
-        Vertices along the face, off it [m], and anything.
+    on : tuple
+        Vertices as `_on` sees them.
     here, level : float
         The place along the face, and off it [m].
     at, way, last : int
@@ -114,7 +127,7 @@ def _reached(
     limit = level + 5e-7  # [m] so near rock counts as touched
     near, low = here, level
     while (last - at) * way >= 0:
-        along, gap, _ = on[at]
+        along, gap = _on(on, at)
         if gap > limit or along < start or along > end:
             # the last step is taken as straight
             part = min(max((limit - low) / (gap - low), 0.0), 1.0) if gap > low else 1.0
@@ -125,14 +138,15 @@ def _reached(
 
 
 @compiled()
-def _lowest(on: Array, here: float, first: int, last: int, more: int, fitted: float) -> float:
+def _lowest(on: Seen, here: float, first: int, last: int, more: int, fitted: float) -> float:
     """Return where a parabola fitted to some of the rock is lowest, near a place on it.
 
     ``first`` and ``last`` of the vertices count, and ``more`` times the place itself, at zero.
     """
     s_0, s_1, s_2, s_3, s_4, g_0, g_1, g_2 = float(more), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(first, last + 1):
-        t, g = (on[i, 0] - here) / fitted, on[i, 1]
+        along, g = _on(on, i)
+        t = (along - here) / fitted
         square = t * t
         s_0, s_1, s_2 = s_0 + 1.0, s_1 + t, s_2 + square
         s_3, s_4 = s_3 + t * square, s_4 + square * square
@@ -148,7 +162,7 @@ def _lowest(on: Array, here: float, first: int, last: int, more: int, fitted: fl
 
 @compiled()
 def _touched(
-    on: Array,
+    on: Seen,
     here: float,
     vertex: int,
     by_end: bool,
@@ -161,8 +175,8 @@ def _touched(
 
     Parameters
     ----------
-    on : ndarray, shape (n, 3)
-        Vertices along the face, off it [m], and anything.
+    on : tuple
+        Vertices as `_on` sees them.
     here : float
         Place along the face at which it met the rock [m].
     vertex, by_end : int, bool
@@ -174,7 +188,7 @@ def _touched(
     """
     first, last = bounds
     before, after = vertex - 1, vertex if by_end else vertex + 1
-    level = 0.0 if by_end else on[vertex, 1]
+    level = 0.0 if by_end else _on(on, vertex)[1]
     back = _reached(on, here, level, before, -1, first, face)
     onward = _reached(on, here, level, after, 1, last, face)
     near, far = min(back, onward), max(back, onward)
@@ -183,9 +197,9 @@ def _touched(
     if far - near >= 2.0 * fitted:
         place = 0.5 * (near + far)
     elif not (faceted or flat or (by_end and far - near < fitted)):
-        while before >= first and abs(on[before, 0] - here) <= fitted:
+        while before >= first and abs(_on(on, before)[0] - here) <= fitted:
             before -= 1
-        while after <= last and abs(on[after, 0] - here) <= fitted:
+        while after <= last and abs(_on(on, after)[0] - here) <= fitted:
             after += 1
         place = _lowest(on, here, before + 1, after - 1, 1 if by_end else 0, fitted)
     return min(max(place, face[0]), face[1]), flat
@@ -250,10 +264,9 @@ def first_contacts(
         if not low + turn <= high:
             continue
         angles[i] = low + turn
-        against = _turned(vertices, joints[i], angles[i])
-        against[:, 1] -= height
+        against = vertices, joints[i], math.cos(angles[i]), math.sin(angles[i]), height
         if not by_end:
-            here = against[vertex, 0]
+            here = _on(against, vertex)[0]
         bounds = firsts[vertex], lasts[vertex]
         places[i], flat[i] = _touched(
             against, here, vertex, by_end, bounds, face[:2], fitted, faceted

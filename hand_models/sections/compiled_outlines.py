@@ -63,10 +63,8 @@ def bounds_of_blocks(points: Complexes, each: int) -> tuple[Complexes, Array, Co
     return centres, radii, halves, thick
 
 
-@compiled("c1", "c1", "c1", "f1", "i0")
-def rock_distances(
-    places: Complexes, points: Complexes, centres: Complexes, radii: Array, each_place: int
-) -> Array:
+@compiled("c1", "c1", "c1", "f1")
+def rock_distances(places: Complexes, points: Complexes, centres: Complexes, radii: Array) -> Array:
     """Return the distance of each of m places from the nearest point of rock, shape (m,) [m].
 
     Parameters
@@ -75,17 +73,36 @@ def rock_distances(
         x + i z [m].
     points, centres, radii : ndarray
         Rock in the finger's plane, a row of `Outlines`.
-    each_place : int
-        1 for the distance of each place; 0, much faster, for a result whose last number is the
-        least distance of all places.
     """
     found = np.full(len(places), math.inf)
     each = len(points) // len(centres)
     for k in range(len(places)):
-        if k and not each_place:
-            found[k] = found[k - 1]
         for block in range(len(centres)):
             if _size(centres[block] - places[k]) - radii[block] < found[k]:
                 for i in range(block * each, block * each + each):
                     found[k] = min(found[k], _size(points[i] - places[k]))
     return found
+
+
+@compiled("c1", "i0", "c1", "c1", "f1")
+def least_distance(
+    places: Complexes, together: int, points: Complexes, centres: Complexes, radii: Array
+) -> float:
+    """Return the least of `rock_distances` [m].
+
+    ``together``: number of places that follow each other and are near each other.
+    """
+    least, each = math.inf, len(points) // len(centres)
+    for first in range(0, len(places), together):
+        own = places[first : first + together]
+        middle, radius = own.mean(), 0.0
+        for place in own:
+            radius = max(radius, _size(place - middle))
+        for block in range(len(centres)):
+            if _size(centres[block] - middle) - radii[block] - radius >= least:
+                continue
+            for place in own:
+                if _size(centres[block] - place) - radii[block] < least:
+                    for i in range(block * each, block * each + each):
+                        least = min(least, _size(points[i] - place))
+    return least

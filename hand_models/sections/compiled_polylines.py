@@ -59,7 +59,10 @@ def _blocks(vertices: Array, ends: Indices) -> tuple[Indices, Array, Array]:
                 longest[block] = max(longest[block], math.sqrt(x * x + y * y))
             spans[block, 0], spans[block, 1] = first, after
             along, across = 0.5 * (back + far), 0.5 * (low + high)
-            boxes[block, 0], boxes[block, 1] = s + along * u - across * v, t + along * v + across * u
+            boxes[block, 0], boxes[block, 1] = (
+                s + along * u - across * v,
+                t + along * v + across * u,
+            )
             boxes[block, 2], boxes[block, 3] = u, v
             more = 1e-12 * (far - back + high - low + abs(s) + abs(t)) + 1e-15
             boxes[block, 4], boxes[block, 5] = 0.5 * (far - back) + more, 0.5 * (high - low) + more

@@ -127,14 +127,14 @@ class Outlines(NamedTuple):
         """
         from hand_models.sections.compiled_outlines import rock_distances
 
-        return rock_distances(places, self.points[0], self.centres[0], self.radii[0], 1)
+        return rock_distances(places, self.points[0], self.centres[0], self.radii[0])
 
     def least_distance(self, places: Complexes) -> float:
-        """Return the least of `distances`, which takes much less time than all of them [m]."""
-        from hand_models.sections.compiled_outlines import rock_distances
+        """Return the least of `distances`, in much less time than all of them [m]."""
+        from hand_models.sections.compiled_outlines import least_distance
 
         sides = self.points[0], self.centres[0], self.radii[0]
-        return float(rock_distances(places, *sides, 0)[-1])
+        return least_distance(places, SECTION_SETTINGS.points_per_circle, *sides)
 
 
 def _standing_out(rock: FingerRock, reach: float, spacing: float) -> tuple[Complexes, Array]:
