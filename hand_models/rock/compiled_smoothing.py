@@ -236,6 +236,8 @@ def _excess(curve: Array, outward: Array, raw: Array, guesses: Indices, rest: fl
             foot = curve[step, k] + part * (curve[after, k] - curve[step, k])
             normal = outward[step, k] + part * (outward[after, k] - outward[step, k])
             out += (raw[i, k] - foot) * normal
+        if out <= 0.0:
+            continue
         if rest > 0.0 and step >= count - 2:
             # the end belongs to the step before it, which is shorter
             part, step = rest * (part if step == count - 2 else 1.0), count - 2

@@ -347,9 +347,9 @@ class OutlinedHold(Hold):
         halves, strips = 0.5 * np.array([size.tile_width, size.frame_width]), size.strips
         seen = facing_triangles(*triangles, some, plane, float(halves.max()), scale.reach)
         least = heights_across(seen, s, halves, strips, BASE_TOLERANCES.length)
-        slabs = np.concatenate([np.outer(halves, [-1.0, 1.0]), strips[:, None].repeat(2, 1)])
         ends = np.broadcast_to(np.full((2, len(s), 2), np.nan), (len(least), 2, len(s), 2))
         if not np.isfinite(least).all():
+            slabs = np.concatenate([np.outer(halves, [-1.0, 1.0]), strips[:, None].repeat(2, 1)])
             ends = rock_ends(seen, s, slabs, least, scale.bridged_gap)
         return Heights(least[0], least[1], least[2:], ends[0], ends[1], ends[2:])
 

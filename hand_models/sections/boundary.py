@@ -67,4 +67,5 @@ class Boundary:
 
 def strung(pieces: Sequence[Array]) -> tuple[Array, Indices]:
     """Join the points of polylines to one array, (n, 2), with the index at which each ends."""
-    return np.ascontiguousarray(np.concatenate(pieces)), np.cumsum([len(each) for each in pieces])
+    whole = pieces[0] if len(pieces) == 1 else np.concatenate(pieces)
+    return np.ascontiguousarray(whole), np.cumsum([len(each) for each in pieces])

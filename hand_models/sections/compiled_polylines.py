@@ -78,7 +78,7 @@ def _beside_box(boxes: Array, block: int, s: float, t: float) -> float:
     u, v = boxes[block, 2], boxes[block, 3]
     along = max(abs(x * u + y * v) - boxes[block, 4], 0.0)
     across = max(abs(y * u - x * v) - boxes[block, 5], 0.0)
-    return along * along + across * across
+    return float(along * along + across * across)
 
 
 @compiled("f2", "i1", "f2")
@@ -225,7 +225,7 @@ def equal_parts(
     sizes : ndarray, shape (n − 1,)
         Distances from each point to the next [m].
     reach : float
-        Distance from the origin beyond which pieces between points are left out [m].
+        Distance from the origin beyond which places are left out [m].
     spacing : float
         Largest step [m].
     relative : float
@@ -261,6 +261,7 @@ def equal_parts(
                 along, into = step[first].real * per_length, step[first].imag * per_length
                 points[total] += complex(along, into) * (place - at[first])
             lengths[total] = length / parts * (0.5 if k in (0, parts) else 1.0)
-            total += 1
+            x, y = points[total].real, points[total].imag
+            total += 1 if x * x + y * y <= reach * reach else 0
         first, at[i + 1] = i + 1, 0.0
     return points[:total], lengths[:total]

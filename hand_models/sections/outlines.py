@@ -153,10 +153,12 @@ def _points(section: Section | None, reach: float, spacing: float) -> tuple[Comp
     """Return places along the boundary within reach, at its corners as well, and their lengths."""
     from hand_models.sections.compiled_polylines import equal_parts
 
-    found: list[tuple[Complexes, Array]] = [(np.zeros(0, dtype=complex), np.zeros(0))]
+    found: list[tuple[Complexes, Array]] = []
     for chain in () if section is None else section.outline(reach, spacing):
         curve, sizes = np.ascontiguousarray(chain), np.abs(np.diff(chain))
         found.append(equal_parts(curve, sizes, reach, spacing, BASE_TOLERANCES.relative))
-    points, lengths = (np.concatenate(values) for values in zip(*found, strict=True))
-    kept = np.abs(points) <= reach
-    return points[kept], lengths[kept]
+    if len(found) == 1:
+        return found[0]
+    nothing = np.zeros(0, dtype=complex), np.zeros(0)
+    points, lengths = (np.concatenate(values) for values in zip(nothing, *found, strict=True))
+    return points, lengths

@@ -88,7 +88,7 @@ class PolylineSection(Section):
             return float(faces.clearances()[0])
 
     def outline(self, reach: float, spacing: float) -> list[Complexes]:
-        return [piece[:, 0] + 1j * piece[:, 1] for piece in self.pieces]
+        return [np.ascontiguousarray(piece).view(complex)[:, 0] for piece in self.pieces]
 
     def distance(self, point: complex) -> float:
         return float(self.boundary.clearances(np.array(point)))
