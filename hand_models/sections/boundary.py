@@ -45,6 +45,13 @@ class Boundary:
         first, last = np.repeat(bounds, lengths, axis=1)
         return self.places, first, last
 
+    @cached_property
+    def blocks(self) -> tuple[Indices, Array, Array]:
+        """Neighbouring segments in blocks, and what bounds them, of `segment_blocks`."""
+        from hand_models.sections.compiled_polylines import segment_blocks
+
+        return segment_blocks(self.places, self.ends)
+
     def clearances(self, points: Complexes) -> Array:
         """Return the signed distance of each point s + i t from the rock [m].
 
@@ -53,13 +60,13 @@ class Boundary:
         from hand_models.sections.compiled_polylines import signed_distances
 
         places = np.ascontiguousarray(points).view(float).reshape(-1, 2)
-        return signed_distances(self.places, self.ends, places).reshape(points.shape)
+        return signed_distances(self.places, self.ends, self.blocks, places).reshape(points.shape)
 
     def normal(self, point: complex) -> complex:
         """Return the unit normal, out of the rock, of the segment nearest a point."""
         from hand_models.sections.compiled_polylines import nearest_segments
 
-        at, _, _ = nearest_segments(self.places, self.ends, np.array([[point.real, point.imag]]))
+        at, _, _ = nearest_segments(self.places, self.blocks, np.array([[point.real, point.imag]]))
         (s, t), after = self.places[at[0] : at[0] + 2]
         step = complex(*after) - complex(s, t)
         return -1j * step / abs(step)

@@ -14,7 +14,16 @@ import numpy as np
 from hand_models.base import Array, Indices, compiled
 from hand_models.sections.section import Complexes
 
-__all__ = ["equal_parts", "highest_rock", "nearest_segments", "signed_distances"]
+__all__ = [
+    "equal_parts",
+    "highest_rock",
+    "nearest_segments",
+    "segment_blocks",
+    "signed_distances",
+]
+
+Blocks = tuple[Indices, Array, Array]
+"""What `segment_blocks` returns."""
 
 
 @compiled()
@@ -26,8 +35,8 @@ def _from_segment(vertices: Array, at: int, s: float, t: float) -> tuple[float, 
     return part, x - part * u, y - part * v
 
 
-@compiled()
-def _blocks(vertices: Array, ends: Indices) -> tuple[Indices, Array, Array]:
+@compiled("f2", "i1")
+def segment_blocks(vertices: Array, ends: Indices) -> Blocks:
     """Return blocks of up to 16 neighbouring segments of polylines, in their order.
 
     They are the first segment of each of b blocks and the one after its last, (b, 2); a box about
@@ -81,14 +90,18 @@ def _beside_box(boxes: Array, block: int, s: float, t: float) -> float:
     return float(along * along + across * across)
 
 
-@compiled("f2", "i1", "f2")
-def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Indices, Array, Array]:
+@compiled("f2", "i2 f2 f1", "f2")
+def nearest_segments(
+    vertices: Array, blocks: Blocks, points: Array
+) -> tuple[Indices, Array, Array]:
     """Return the nearest segment to each of n points.
 
     Parameters
     ----------
-    vertices, ends : ndarray, shapes (p, 2) and (k,)
-        Points of the polylines [m], and the index at which each ends.
+    vertices : ndarray, shape (p, 2)
+        Points of the polylines [m].
+    blocks : tuple of ndarray
+        Their `segment_blocks`.
     points : ndarray, shape (n, 2)
         Points (s, t) [m].
 
@@ -101,12 +114,13 @@ def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Ind
     away : ndarray, shape (n, 2)
         Vector (s, t) from that place to the point [m].
     """
-    spans, boxes, longest = _blocks(vertices, ends)
+    spans, boxes, longest = blocks
     segments, parts = np.zeros(len(points), dtype=np.intp), np.zeros(len(points))
     away, nearest, near, count = np.empty((len(points), 2)), 0, np.empty(len(spans), np.intp), 0
     # points follow each other: blocks that may have what is nearest to one are so for those that
     # are no farther from it than this
-    reach, s_0, t_0, far = 8.0 * longest.max(), math.inf, math.inf, 0.0  # [m]
+    reach = 8.0 * longest.max() if len(longest) else 0.0  # [m]
+    s_0, t_0, far = math.inf, math.inf, 0.0
     for i in range(len(points)):
         s, t = points[i]
         # the segment nearest to the point before is near to this one
@@ -145,13 +159,14 @@ def _out(vertices: Array, at: int, way: Array) -> float:
     return float((way[0] * v - way[1] * u) / math.sqrt(u * u + v * v))
 
 
-@compiled("f2", "i1", "f2")
-def signed_distances(vertices: Array, ends: Indices, points: Array) -> Array:
+@compiled("f2", "i1", "i2 f2 f1", "f2")
+def signed_distances(vertices: Array, ends: Indices, blocks: Blocks, points: Array) -> Array:
     """Return the distance of each of n points from polylines, negative inside the rock, (n,) [m].
 
-    Where rock ends nothing is inside. Arguments are those of `nearest_segments`.
+    Where rock ends nothing is inside. ``ends``: index at which each polyline ends, (k,); the other
+    arguments are those of `nearest_segments`.
     """
-    segments, parts, away = nearest_segments(vertices, ends, points)
+    segments, parts, away = nearest_segments(vertices, blocks, points)
     found = np.empty(len(points))
     for i in range(len(points)):
         at, piece = segments[i], 0

@@ -6,10 +6,17 @@ from hypothesis import given, strategies as st
 
 from hand_models.finger.around import around_rock
 from hand_models.finger.model import FingerModel
-from hand_models.finger.path_state import OpenFinger, drives
+from hand_models.finger.path_state import SETTINGS_RECORD, OpenFinger, drives
 from hand_models.finger.phalanx_shape import PhalanxShape, fan_out
 from hand_models.parameters import ParameterTable, own_hand
-from hand_models.sections import Disc, FingerRock, FlatRock, Outlines
+from hand_models.sections import (
+    Disc,
+    FingerRock,
+    FlatRock,
+    Outlines,
+    PolylineSection,
+    RockStrips,
+)
 from hand_models.tile import Surface
 from tests.suite.helpers import phalanges
 from tests.suite.helpers.hands import HAND
@@ -203,3 +210,33 @@ def test_the_share_of_spines_across_a_gap_follows_the_hands_law(exponent):
         around = around_rock(outlines, PhalanxShape.of(model), drive, np.zeros((1, 3)))
         expected = 1.0 - (gap / 5e-3) ** exponent
         np.testing.assert_allclose(around["share"][0], expected, atol=2e-3)
+
+
+def rough_rock(rng):
+    """Rock under a finger and beside it that goes up and down, in 17 strips across its tiles."""
+    s = np.arange(-0.15, 0.15, 5e-4)
+    waves = 10.0 ** rng.uniform(-4.0, -2.7, 4)[:, None] * np.sin(
+        np.outer(rng.uniform(20.0, 400.0, 4), s) + rng.uniform(0.0, 6.0, (4, 1))
+    )
+    t = H + rng.uniform(0.0, 6e-3) + waves.sum(axis=0)
+    beside = t - np.maximum(5e-4 * np.sin(rng.uniform(50.0, 300.0) * s), 0.0)
+    tile, frame = (np.column_stack([s, each]) for each in (t, beside))
+    behind = rng.uniform(0.0, 3e-3, (len(s), 17))
+    behind[rng.random(behind.shape) < 0.1] = np.inf
+    strips = RockStrips(np.linspace(-0.012, 0.012, 17), s + 1j * t, np.full(len(s), 1j), behind)
+    return FingerRock(PolylineSection([tile]), PolylineSection([frame]), strips)
+
+
+@given(seeds)
+def test_derivatives_are_differences_from_a_finger_that_is_turned(seed):
+    """Of all that is around it there, not only of the rock that counts where it is."""
+    rng = np.random.default_rng(seed)
+    rock, turn = rough_rock(rng), SETTINGS_RECORD["derivative_turn"][0]
+    drive = drives(MODEL, [OpenFinger(rock, Surface.named("rock"), 37.0)] * 4)
+    q = np.vstack([np.zeros(3), turn * np.eye(3)]) + rng.uniform(-0.1, 0.3, 3)
+    outlines = Outlines.of([rock] * 4, MODEL.size.reach, SHAPE.spacing)
+    here, *turned = around_rock(outlines, SHAPE, drive, q)
+    for k, there in enumerate(turned):
+        for name in ("gap", "share", "a", "b"):
+            change = (there[name] - here[name]) / turn
+            np.testing.assert_allclose(here[f"d_{name}"][..., k], change, atol=1e-8)

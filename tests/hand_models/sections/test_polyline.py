@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 
 from hand_models.rock import Profile
 from hand_models.sections import Disc, Face, PolylineSection, Rest, strung
-from hand_models.sections.compiled_polylines import nearest_segments
+from hand_models.sections.compiled_polylines import nearest_segments, segment_blocks
 from tests.suite.helpers.rocks import distance
 from tests.suite.helpers.shares import given_some
 
@@ -153,7 +153,8 @@ def test_the_nearest_segment_is_found_among_all(seed):
     along = ((points[:, None] - start) * step).sum(axis=2) / (step**2).sum(axis=1)
     places = start + np.clip(along, 0.0, 1.0)[..., None] * step
     want = np.linalg.norm(points[:, None] - places, axis=2)
-    at, part, away = nearest_segments(*strung(pieces), points)
+    vertices, ends = strung(pieces)
+    at, part, away = nearest_segments(vertices, segment_blocks(vertices, ends), points)
     segment = at - np.searchsorted(np.cumsum([len(piece) for piece in pieces]), at, side="right")
     np.testing.assert_allclose(np.hypot(*away.T), want.min(axis=1), atol=1e-14)
     np.testing.assert_allclose(want[np.arange(30), segment], want.min(axis=1), atol=1e-14)
