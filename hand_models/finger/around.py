@@ -1,7 +1,7 @@
-"""What is around a finger at its joint angles: gaps, engagement, lever arms (compiled).
+"""Gaps, engagement and lever arms of a finger at its joint angles, with derivatives (compiled).
 
-Their derivatives by the joint angles are differences over a small turn of each joint. For so small
-a turn only that rock counts which, without it, counts or is near to it: it is looked for once.
+Derivatives by the joint angles are differences over a small turn of each joint. For so small a turn
+only that rock counts which, without it, counts or is near to counting: it is looked for once.
 """
 
 from __future__ import annotations
