@@ -75,8 +75,8 @@ class KeptMargins(NamedTuple):
         """Yield a finding unless all is kept; ``cap`` is the question's, on the utilisation."""
         if self.share == 1.0 or not self.asked:
             return
-        kept, more = f"only {100.0 * self.share:.0f} %", "more"
-        if self.share < 0.005:
+        kept, more = f"only {100.0 * self.share:{'.0f' if self.share >= 0.1 else '.2g'}} %", "more"
+        if self.share * max(self.asked.values()) < MARGIN_SETTINGS.least:
             kept, more = "nothing", "any of it"
         end = f"take the utilisation beyond {self.most:.4g}, where {self.least:.4g} is the least"
         if self.least > cap + CAP_SLACK:

@@ -51,6 +51,7 @@ def oddities(prepared: PreparedStance) -> tuple[tuple[Finding, ...], tuple[str, 
         *warnings(question.stance, prepared.batch),
         *_off_sentences(where),
         *_joint_sentences(question, where),
+        *_unused_sentences(question, prepared.batch),
     )
     return odd, words
 
@@ -107,6 +108,22 @@ def scene_findings(prepared: PreparedStance) -> tuple[Finding, ...]:
     scene, where = scene_of(prepared.question.stance, prepared.batch.hands), prepared.where
     odd = findings(scene)
     return odd if where is None else (*odd, *link_findings(scene, where.angles))
+
+
+def _unused_sentences(question: Question, batch: HandBatch) -> Iterator[str]:
+    """Yield what the question has that no hand of the stance takes."""
+    fixed = [hand.wrist == "fixed" for hand in question.stance.hands]
+    pressing = zip(fixed, batch.hands, strict=True)
+    if question.limits.palm_margin and not any(own and hand.palm.engaged for own, hand in pressing):
+        yield (
+            "limits.palm_margin: no hand with a fixed wrist has its palm on the rock, so that no "
+            "palm has to press; see hold_margin"
+        )
+    if question.stance.limb_stiffness is not None and all(fixed):
+        yield (
+            "stance.limb_stiffness: all wrists are fixed, so that nothing depends on it; it is for "
+            "compliant and floating wrists"
+        )
 
 
 def _load_findings(question: Question, where: Posture | None) -> tuple[Finding, ...]:

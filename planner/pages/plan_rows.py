@@ -113,7 +113,7 @@ def sample_table(plan: Plan) -> PageTable | None:
         counts = each.holds, spread.draws - each.holds - each.without, each.without
         used = each.utilisation
         rows.append([words, *counts, *((None, None) if used is None else (used.low, used.high))])
-    columns = "tensions,feasible,overloaded,no balance,utilisation from,utilisation to"
+    columns = f"tensions,feasible,{spread.failing},no balance,utilisation from,utilisation to"
     return PageTable("Samples of what is not known of hand and rock", columns, rows)
 
 

@@ -190,8 +190,8 @@ class Spread(Struct, frozen=True):
     utilisation : Quantiles or None
         Over the samples with a plan.
     load_factor : Quantiles or None
-        Over all samples; a sample without plan and load factor counts as 0. None if no sample has a
-        load factor.
+        Over all samples; a sample without load factor counts as 0 if it has no plan, or its plan is
+        overloaded. None if no sample has a load factor.
     hangs_on : list of Influence
         Deprecated: the same as ``sensitive_to``.
     utilisations, load_factors : list of float or None
@@ -247,6 +247,12 @@ class Spread(Struct, frozen=True):
     feedback: SentSpread | None = None
 
     @property
+    def failing(self) -> str:
+        """Why samples with a balance do not hold; only where limbs balance it, tiles may drag."""
+        moving = self.kept is not None and self.feedback is None
+        return "overloaded or dragged" if moving else "overloaded"
+
+    @property
     def answers(self) -> dict[str, Spread | SentSpread]:
         """Statistics of each way to meet the samples, by its name."""
         every = {
@@ -290,7 +296,7 @@ class Spread(Struct, frozen=True):
         influences = [_sourced(each, sources) for each in _influences(factors, drawn)]
         rock_share, apart = _apart(factors, drawn)
         carried = [
-            0.0 if u is None and factor is None else factor
+            0.0 if factor is None and (u is None or u > 1.0) else factor
             for u, factor in zip(used, factors, strict=True)
         ]
         return cls(

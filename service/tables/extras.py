@@ -121,7 +121,7 @@ def print_spread(spread: Spread, out: Console) -> None:
         for words, each in there
     ]
     if len(rows) > 1:
-        heads = ("feasible", "overloaded", "no balance", "utilisation")
+        heads = ("feasible", spread.failing, "no balance", "utilisation")
         print_rows(rows, in_order([counted(spread.draws, "sample")], heads), out, result=True)
 
 

@@ -271,6 +271,7 @@ def test_where_wrists_move_limbs_balance_the_body_on_tensions_that_are_kept(wris
     answer = plan(replace(asked, stance=replace(asked.stance, limb_stiffness=stiffness)))
     found = answer.spread
     assert found.feedback is None
+    assert found.failing == "overloaded or dragged"
     assert found.kept.without == 0
     usual, stronger, moved_on = found.kept.utilisations
     assert usual == pytest.approx(answer.utilisation, rel=1e-5)

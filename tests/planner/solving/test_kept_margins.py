@@ -11,6 +11,7 @@ import pytest
 from hand_models.base import InvalidInputError
 from planner import Limits, Plan, Question, plan
 from planner.prepare import prepare_stance
+from planner.question import LimbStiffness
 from planner.result import Finding
 from planner.streaming import WrenchStream
 from tests.suite.helpers.stances import limited, random_question
@@ -73,6 +74,13 @@ def test_of_twice_the_margin_half_the_share_is_kept() -> None:
     assert twice == pytest.approx(0.5 * once, abs=2e-6)
 
 
+def test_a_small_share_of_a_large_margin_is_said() -> None:
+    answer = plan(limited("wall-300", margins="if_possible", hold_margin=1000.0))
+    (finding,) = found(answer)
+    assert 1e-3 < finding.value < 5e-3
+    assert f"the plan keeps only {100 * finding.value:.2g} %: more would" in finding.message
+
+
 @pytest.mark.parametrize("seed", [1, 9, 18, 28, 34, 66])
 def test_a_share_costs_a_tenth_at_most_and_no_status(seed: int) -> None:
     bare = random_question(seed)
@@ -117,6 +125,23 @@ def test_what_overloads_without_margins_keeps_those_that_cost_nothing() -> None:
     heavy = replace(heavy, body_wrench=1.2 * heavy.needed_wrench())
     free = plan(heavy)
     assert (free.status, free.margin_share) == ("overloaded", 1.0)
+
+
+def test_a_margin_of_palms_that_no_hand_takes_is_warned_of() -> None:
+    for name, warned in (("wall-300", False), ("ledge", True)):
+        asked = limited(name, palm_margin=5.0)
+        if warned:
+            bare = msgspec.structs.replace(asked.stance.hands[0].grasp, palm=False)
+            hands = [replace(hand, grasp=bare) for hand in asked.stance.hands]
+            asked = replace(asked, stance=replace(asked.stance, hands=tuple(hands)))
+        assert any("no palm has to press" in each for each in plan(asked).warnings) == warned
+
+
+def test_a_stiffness_of_limbs_that_no_wrist_needs_is_warned_of() -> None:
+    limbs = LimbStiffness(position=5e3, angle=100.0)
+    asked = limited("wall-300")
+    asked = replace(asked, stance=replace(asked.stance, limb_stiffness=limbs))
+    assert any("all wrists are fixed" in each for each in plan(asked).warnings)
 
 
 def test_without_a_plan_there_is_no_share() -> None:

@@ -152,6 +152,14 @@ def test_ties_and_missing_load_factors_are_minded():
     assert few.sensitive_to == []
 
 
+def test_what_is_overloaded_without_a_load_factor_counts_as_0():
+    plans = [DrawnPlan(1.5), DrawnPlan(), DrawnPlan(0.5, 2.0, True), DrawnPlan(0.8, 1.2, True)]
+    assert Spread.of(plans, 1.0, {}, {}).load_factor == Quantiles(0.0, 0.6, 2.0)
+    # without a load every multiple of it is held
+    unloaded = [DrawnPlan(0.3, None, True), DrawnPlan(0.4, None, True)]
+    assert Spread.of(unloaded, 1.0, {}, {}).load_factor is None
+
+
 def test_draws_without_an_answer_do_not_hold_and_are_told():
     weak = drawn(tendon={"maximum_tension": entry(50.0, "N")})
     stance = on_wall(closing_tension=60.0)
