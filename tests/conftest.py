@@ -134,6 +134,15 @@ def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def few_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Plan 25 changed stances instead of 100 where advice is asked for."""
+    from planner.advice import advising
+
+    few = functools.partial(advising.advise, plans=25)
+    monkeypatch.setattr(advising, "advise", few)
+
+
+@pytest.fixture
 def blank_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw nothing into the pictures of a route, which take longer than its plans."""
     from matplotlib.figure import Figure

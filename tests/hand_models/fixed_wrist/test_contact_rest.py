@@ -212,7 +212,7 @@ def test_what_contact_leaves_is_less_than_a_given_pose() -> None:
     shear = [[-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
     given = pinch()
     contact = rest(given)
-    one, other = (robustness(HAND, each, shear, draws=16) for each in (given, contact))
+    one, other = (robustness(HAND, each, shear, draws=8) for each in (given, contact))
     assert one.contact is None
     assert other.contact == HAND.contact_scatter == (0.00025, 0.003)
     assert (one.position, one.angle) == (other.position, other.angle) == (0.002, 0.02)

@@ -149,7 +149,7 @@ class LinearFit:
 
 def test_of_a_linear_model_the_posterior_is_that_of_least_squares(monkeypatch):
     fit = LinearFit()
-    effort = PosteriorSettings(first_sets=60, wave_sets=40, last_sets=1500, walkers=60, steps=900)
+    effort = PosteriorSettings(first_sets=60, wave_sets=40, last_sets=800, walkers=60, steps=500)
     search = Posterior(fit, effort)
     monkeypatch.setattr(search, "_left_out", lambda found: 0.03)
     told = []

@@ -327,6 +327,7 @@ def laden(mass: float, folder: Path) -> str:
 # The command ------------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_route_command_writes_its_files_and_prints_json_alone(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ):

@@ -1,5 +1,6 @@
 """A hold that only this file knows: placed on, planned on, drawn and kept clear of."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,14 +51,17 @@ class Ridge(Hold):
     def entry(self, point, direction):
         p, d = np.asarray(point, dtype=float), np.asarray(direction, dtype=float)
         slope, up = self.slope**2, p[2] + self.radius
-        terms = (
-            slope * d[0] ** 2 - d[2] ** 2,
-            2.0 * (slope * p[0] * d[0] - up * d[2]),
-            slope * p[0] ** 2 + self.radius**2 - up**2,
-        )
-        met = [r.real for r in np.roots(terms) if abs(r.imag) < 1e-12 and up + r.real * d[2] > 0.0]
+        a = slope * d[0] ** 2 - d[2] ** 2
+        b = slope * p[0] * d[0] - up * d[2]
+        c = slope * p[0] ** 2 + self.radius**2 - up**2
+        if b * b < a * c:
+            return math.inf
+        # of a t² + 2 b t + c, without a difference of like numbers
+        q = -(b + math.copysign(math.sqrt(b * b - a * c), b))
+        roots = [top / low for top, low in ((q, a), (c, q)) if low != 0.0]
+        met = [r for r in roots if up + r * d[2] > 0.0]
         entered = [r for r in met if self.depth(p + (r + 1e-6) * d) > 0.0]
-        return float(min(entered, default=np.inf))
+        return float(min(entered, default=math.inf))
 
 
 @dataclass(frozen=True)

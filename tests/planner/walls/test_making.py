@@ -30,9 +30,11 @@ from tests.suite.helpers.climbing_walls import (
     FLAT,
     TINY,
     arrays_of,
+    asked_once,
     rock_of,
     tiny_source,
     tiny_wall,
+    wall_besides,
 )
 
 DIRECTIONS = np.random.default_rng(0).normal(size=(10, 6))
@@ -111,7 +113,7 @@ def test_given_placements_and_bodies_come_last():
     body = Pose(made.bodies[0].position + np.array([0.0, 0.02, 0.0]), made.bodies[0].rotation)
     more = replace(source, more_places=[given], more_bodies=[body])
     poses = more.poses()
-    whole = wall_of(more, poses)
+    whole = wall_besides(more, poses)
     wall = whole.wall
     assert (whole.given, poses.given) == ((len(made.places),), (len(made.bodies),))
     assert wall.places[-1].limb == "rear_left"
@@ -124,12 +126,12 @@ def test_given_placements_and_bodies_come_last():
     assert any(pair.tolist() == [0, len(made.bodies)] for pair in wall.shifts)
     loose = replace(source, more_places=[replace(given, wrist="compliant")])
     with pytest.raises(UnsupportedError, match=r"more_places\[0\]\.wrist: must have a fixed"):
-        wall_of(loose, loose.poses())
+        wall_besides(loose, loose.poses())
     far = Pose(given.pose.position + np.array([0.0, 0.0, 9.0]), given.pose.rotation)
     off_rock = replace(given, pose=far, hold_in_hand=None, hold_pose=source.rock_pose)
     off = replace(source, more_places=[given, off_rock])
     with pytest.raises(InvalidInputError, match=r"more_places\[1\]\.pose: no tile is on the rock"):
-        wall_of(off, off.poses())
+        wall_besides(off, off.poses())
 
 
 def test_what_the_grids_have_counts_once():
@@ -144,7 +146,7 @@ def test_what_the_grids_have_counts_once():
     hands = [replace(about, grasp=each) for each in (grasp, other, grasp, other)]
     more = replace(source, more_places=hands, more_bodies=[body, body])
     poses = more.poses()
-    whole = wall_of(more, poses)
+    whole = wall_besides(more, poses)
     count = len(made.places)
     assert (whole.given, len(whole.wall.places)) == ((3, count, 3, count), count + 1)
     assert (poses.given, len(poses.poses)) == ((1, 1), len(made.bodies))
@@ -201,12 +203,12 @@ def test_walls_that_no_file_can_have(tmp_path):
 def test_lost_chunks_are_counted_and_the_rest_is_made():
     source, whole = tiny_source(), tiny_wall().wall
     bodies = source.poses()
-    calls = []
+    answers, calls = asked_once(source, bodies), []
 
     def ask(questions):
         calls.append(questions)
         for i, question in enumerate(questions):
-            yield None if i == 1 else source.answer(question, bodies)
+            yield None if i == 1 else next(answers([question]))
 
     made = wall_of(source, bodies, ask)
     # 6 points of a chunk, two hands at each

@@ -20,7 +20,7 @@ ROBOT, ROCK = robosimian(), Surface.named("rock")
 @pytest.fixture(scope="module")
 def tried():
     rock, pose = rock_of(1)
-    points = place_trials(PlaceGrid(spacing=0.35, angles=2), rock, ROBOT.hand)
+    points = place_trials(PlaceGrid(spacing=0.45, angles=2), rock, ROBOT.hand)
     up = pose.rotation.T @ [0.0, 0.0, 1.0]
     return rock, pose, points, up
 

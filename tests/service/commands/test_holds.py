@@ -307,7 +307,7 @@ def test_what_was_tried_is_kept_when_the_cluster_is_gone(rock, tmp_path, capfd, 
 @watched
 def test_an_interruption_ends_the_search(rock, tmp_path):
     output = tmp_path / "holds.json"
-    process = begun("holds", str(rock), "-o", str(output), "--workers", "2")
+    process = begun("holds", str(rock), "-o", str(output), *COARSE, "--workers", "2")
     until(lambda: workers(process), process)
     process.send_signal(signal.SIGTERM)
     status, error = ended(process)

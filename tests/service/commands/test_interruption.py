@@ -10,10 +10,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from hand_models.base import whole_file
 from service.commands.cli import run_command_line
+from service.commands.stances import read_route
 from service.processes import Interrupted
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, OVERLOADED, complaint, result
@@ -47,7 +49,11 @@ def told(path: Path) -> list[dict]:
 @watched
 @pytest.mark.parametrize("number", SIGNALS)
 def test_a_route_ends_with_its_processes(number, tmp_path):
-    process = begun("route", "six-moves", "-o", str(tmp_path), "--workers", "3")
+    route, folder = tmp_path / "route.json", tmp_path / "climb"
+    # of palms with a margin no trajectory is looked for before the stages
+    asked = msgspec.to_builtins(read_route("six-moves")) | {"limits": {"palm_margin": 1.0}}
+    route.write_text(json.dumps(asked), encoding="utf-8")
+    process = begun("route", str(route), "-o", str(folder), "--workers", "2")
     until(lambda: workers(process), process)
     process.send_signal(number)
     assert ended(process) == (FAILED, "crux: interrupted\n")
@@ -204,7 +210,7 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path):
 @watched
 @pytest.mark.parametrize("number", SIGNALS)
 def test_a_service_that_starts_ends_at_once_with_its_processes(number):
-    process = begun("serve", "-l", free_endpoint(), "--workers", "3")
+    process = begun("serve", "-l", free_endpoint(), "--workers", "2")
     until(lambda: workers(process), process)
     process.send_signal(number)
     # a process that has just been born may say that its parent is gone

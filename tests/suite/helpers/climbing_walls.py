@@ -3,13 +3,14 @@
 from dataclasses import replace
 from functools import cache
 
+import msgspec
 import numpy as np
 
 from hand_models.parameters import ParameterTable, wall_table
 from hand_models.rock import Mesh
 from hand_models.scans import generate_wall
 from planner.robots import robosimian
-from planner.walls import BodyGrid, PlaceGrid, WallSource
+from planner.walls import BodyGrid, PlaceGrid, WallSource, wall_of
 
 NUMBERS = {"height": 1.5, "width": 1.3, "spacing": 0.02, "knobs": 10.0}
 TINY = {"height": 1.25, "width": 1.0}
@@ -57,9 +58,32 @@ def arrays_of(wall):
 
 
 @cache
+def _hands_at(question):
+    """The answer to a question about points on the rock of `tiny_source`."""
+    return tiny_source().answer(question, None)
+
+
+def asked_once(source, bodies):
+    """A way to ask chunks, of which hands at points of the rock are closed once for all walls.
+
+    The source is `tiny_source`, or has placements and bodies of its own besides.
+    """
+
+    def ask(questions):
+        for question in questions:
+            points = msgspec.msgpack.decode(question).get("points")
+            yield _hands_at(question) if points else source.answer(question, bodies)
+
+    return ask
+
+
+def wall_besides(source, bodies):
+    """The wall of `tiny_source` with placements and bodies of its own, made in this process."""
+    return wall_of(source, bodies, asked_once(source, bodies))
+
+
+@cache
 def tiny_wall():
     """The wall of `tiny_source`, made in this process."""
-    from planner.walls import wall_of
-
     source = tiny_source()
-    return wall_of(source, source.poses())
+    return wall_besides(source, source.poses())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import msgspec
 from jsonschema import Draft202012Validator
 
@@ -34,11 +36,15 @@ def reply_to(request: object, form: str = JSON) -> PlanReply:
     return Format.named(answer.encoding).decode(answer.payload, PlanReply)
 
 
+@cache
+def validator(name: str) -> Draft202012Validator:
+    """The check that a document is a message of that name."""
+    return Draft202012Validator({"$ref": f"#/$defs/{name}", "$defs": schema()["$defs"]})
+
+
 def departures(name: str, document: object) -> list[tuple]:
     """Where a document departs from the schema of that message."""
-    whole = {"$ref": f"#/$defs/{name}", "$defs": schema()["$defs"]}
-    errors = Draft202012Validator(whole).iter_errors(document)
-    return [tuple(error.absolute_path) for error in errors]
+    return [tuple(error.absolute_path) for error in validator(name).iter_errors(document)]
 
 
 def check_answer(answer: Answer, what: object) -> str:
