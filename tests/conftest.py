@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from importlib.util import find_spec
 from pathlib import Path
@@ -142,13 +143,26 @@ def few_changes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(advising, "advise", few)
 
 
-@pytest.fixture
-def blank_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+def draw_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw nothing into the pictures of a route, which take longer than its plans."""
     from matplotlib.figure import Figure
 
     for name in ("draw_route", "draw_climb", "draw_support"):
         monkeypatch.setattr(f"planner.pictures.report.{name}", lambda *_: Figure((1.0, 1.0)))
+
+
+@pytest.fixture
+def blank_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw nothing into the pictures of a route."""
+    draw_nothing(monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def blank_pictures_of_all() -> Iterator[None]:
+    """Draw nothing into the pictures of a route in all tests of a module."""
+    with pytest.MonkeyPatch.context() as patched:
+        draw_nothing(patched)
+        yield
 
 
 @pytest.fixture

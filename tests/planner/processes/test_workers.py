@@ -222,8 +222,9 @@ def test_where_what_they_are_forked_from_is_killed_nothing_is_lost():
         assert not any(isinstance(each, Lost) for each in done(workers, [None] * 8).values())
         last = [process.pid for process in processes(workers)]
         assert (len(last), first[1] in last, first[0] in last) == (2, True, False)
-        words = Path(f"/proc/{(set(last) - {first[1]}).pop()}/cmdline").read_bytes()
-        assert b"spawn_main" in words
+        words = Path(f"/proc/{(set(last) - {first[1]}).pop()}/cmdline")
+        # there are none yet of a process that has just been born
+        assert soon(lambda: b"spawn_main" in words.read_bytes())
     # the end of the pool ends them all
     assert soon(lambda: not any(Path(f"/proc/{pid}").exists() for pid in {*first, *last}))
 

@@ -29,7 +29,7 @@ def file_of(route: RouteRequest, folder: Path) -> str:
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory) -> Path:
+def written(tmp_path_factory, blank_pictures_of_all) -> Path:
     folder = tmp_path_factory.mktemp("climb")
     assert run_command_line(["route", file_of(two_moves(), folder), "-o", str(folder)]) == DONE
     return folder

@@ -11,7 +11,7 @@ from hand_models.base import InvalidInputError
 from hand_models.tile import Surface
 from planner.walls import BodyGrid, PlaceGrid, WallSource, wall_digest
 from service.processes import make_wall
-from tests.suite.helpers.climbing_walls import tiny_source, tiny_wall
+from tests.suite.helpers.climbing_walls import asked_once, tiny_source, tiny_wall
 from tests.suite.helpers.processes import PATIENCE
 
 
@@ -24,6 +24,14 @@ class Unable(WallSource):
 
     def answer(self, question, bodies):
         raise AssertionError
+
+
+class Kept(WallSource):
+    """A source of which hands at points are closed once for all walls of these tests."""
+
+    def answer(self, question, bodies):
+        (answer,) = asked_once(as_a(WallSource, self), bodies)([question])
+        return answer
 
 
 class Deadly(WallSource):
@@ -40,7 +48,7 @@ def as_a(kind, source):
 
 
 def test_chunks_in_a_file_are_not_worked_out_again(tmp_path):
-    source, kept, seen = tiny_source(), tmp_path / "chunks", []
+    source, kept, seen = as_a(Kept, tiny_source()), tmp_path / "chunks", []
 
     def stop(phase, done, total):
         seen.append((phase, done, total))

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.suite.helpers.checkout import ROOT
-from tests.suite.helpers.patience import PATIENCE, soon
+from tests.suite.helpers.patience import PATIENCE, PAUSES, soon
 
 PROC = Path("/proc")
 
@@ -39,7 +39,8 @@ def until(true: Callable[[], object], process: subprocess.Popen[bytes]) -> None:
         assert process.poll() is None, process.communicate()
         return False
 
-    assert soon(came)
+    # what a process does meanwhile may be over soon
+    assert soon(came, longest=PAUSES[0])
 
 
 def alive(session: int) -> dict[int, tuple[int, str]]:
