@@ -25,7 +25,6 @@ from service.commands.stances import read_request
 from tests.planner.solving.test_spread import STRENGTHS, drawn, entry, radii, seat, with_wrists
 from tests.suite.helpers.checks import problems
 from tests.suite.helpers.commands import DONE
-from tests.suite.helpers.spreads import asked_of
 from tests.suite.helpers.stances import ask, moved, on_wall
 
 STIFFER = drawn(tile={"contact_stiffness": entry([5500.0, 6500.0, 9500.0], "N/m")})
@@ -162,7 +161,7 @@ def test_on_the_hands_of_the_plan_its_tensions_are_its_plan():
 
 def test_no_set_points_are_better_than_a_plan_made_anew_and_feedback_balances_more():
     for name in ("wall-300", "slab"):
-        found = judged(asked_of(name))
+        found = judged(question(read_request(name)))
         assert found.kept.without > 0
         # of a sample without a plan there is none either
         assert found.feedback.without == found.without < found.kept.without

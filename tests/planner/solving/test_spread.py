@@ -189,8 +189,7 @@ def test_only_wrists_that_move_on_rock_draw_its_stiffness(wrist, surface, moves,
 
 
 def test_the_plan_itself_stays():
-    rock = replace(Surface.named("rock"), half_planes=1)
-    asked = ask(on_wall(surface=rock), "load_factor")
+    asked = ask(on_wall(), "load_factor")
     plain, told = plan(asked), plan(replace(asked, want=frozenset(["load_factor", "spread"])))
     assert plain.spread is None
     assert told.load_factor == plain.load_factor
@@ -272,8 +271,7 @@ def test_a_best_seat_is_kept_where_it_was_found():
 
 def test_a_hand_of_the_callers_own_stays_in_what_it_changes():
     mine = own_hand(own_draw({"hand": {"finger": radii(0.003, 0.0024) | seat(0.0241)}}).hand)
-    tile = replace(TILE_60N, half_planes=1)
-    stance = replace(on_wall(surface=tile), robot=robosimian(mine))
+    stance = replace(on_wall(surface=TILE_60N), robot=robosimian(mine))
     found = plan(ask(stance, "spread")).spread
     assert found.sensitive_to
     sections = {each.quantity.split(".")[0] for each in found.sensitive_to}

@@ -41,13 +41,7 @@ STRENGTHS = tuple(drawn(strength) for strength in (40.0, 65.0, 80.0, 55.0))
 
 
 def asked_of(name: str, **kwargs) -> Question:
-    """A bundled stance, and its load factor's spread.
-
-    Tiles have one half-plane of pull-off: those of each draw are fitted, which takes longest.
-    """
-    asked = question(read_request(name))
-    hands = tuple(
-        replace(hand, surface=replace(hand.surface, half_planes=1)) for hand in asked.stance.hands
+    """A bundled stance, and its load factor's spread."""
+    return replace(
+        question(read_request(name)), want=frozenset(["spread", "load_factor"]), **kwargs
     )
-    stance = replace(asked.stance, hands=hands)
-    return replace(asked, stance=stance, want=frozenset(["spread", "load_factor"]), **kwargs)
