@@ -340,11 +340,13 @@ def _print_rock(
         before = (scan.points.mean(axis=0) - scan.viewpoint) @ made.pose.rotation[:, 2]
         origin = f"from the file's origin, {before:.2g} m before the rock"
         whence += ", assumed: " + (origin if scan.faces is None else "from above")
+    beside = made.read - made.dropped - made.outliers - made.alone - len(made.vertices)
     rows = [
         ("points read", f"{made.read:,}", ""),
         ("dropped", f"{made.dropped:,}", "not finite, or several at (0, 0, 0)"),
         ("outliers", f"{made.outliers:,}", "dropped, far from their neighbours"),
         ("alone", f"{made.alone:,}", "left out, joined to nothing, maybe stray"),
+        ("passed over", f"{beside:,}", "close to others, or in open gaps"),
         ("kept", f"{len(made.vertices):,}", f"{1e3 * made.spacing:.3g} mm apart"),
         ("triangles", f"{len(made.faces):,}", "the file's own" if made.kept else ""),
         ("extent", " × ".join(f"{size:.3f}" for size in made.extent), "m along x, y, z"),
@@ -354,6 +356,7 @@ def _print_rock(
         ("steps", *_sizes("higher", [each.height for each in made.steps], hole)),
     ]
     absent = {"outliers": not made.outliers, "alone": not made.alone}
+    absent["passed over"] = made.kept or not beside
     rows = [row for row in rows if not absent.get(row[0])]
     if tables.verbosity() >= 0:
         tables.print_rows(rows, tables.in_order([""], [""], [""]), out, heads=False)

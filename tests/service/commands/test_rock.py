@@ -57,6 +57,9 @@ def test_the_table_tells_what_was_read_and_what_is_open(tmp_path, capfd):
     rows = {line[:12].strip(): line[12:].split() for line in table}
     assert int(rows["points read"][0].replace(",", "")) > 10_000
     assert rows["dropped"][0] == "1"
+    parts = ("dropped", "outliers", "alone", "passed over", "kept")
+    counts = {name: int(rows[name][0].replace(",", "")) for name in parts if name in rows}
+    assert sum(counts.values()) == int(rows["points read"][0].replace(",", ""))
     assert rows["holes"][0] == "1"
     assert float(rows["holes"][-2]) == pytest.approx(50, abs=5)
     mesh = trimesh.load_mesh(str(output), process=False)
