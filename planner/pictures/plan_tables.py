@@ -5,9 +5,10 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from matplotlib.colors import to_rgba
 
 from hand_models.base import COLOUR_OF, Array
 from hand_models.hand import NAIL
@@ -218,18 +219,41 @@ def draw_answers(axes: Any, spread: Spread) -> None:
     }
     left = np.zeros(len(there))
     for words, (counts, colour) in parts.items():
-        bars = axes.barh(list(there), counts, left=left, color=colour, label=words, height=0.7)
-        axes.bar_label(bars, [str(n or "") for n in counts], label_type="center", fontsize=8)
+        axes.barh(list(there), counts, left=left, color=colour, label=words, height=0.55)
         left = left + counts
-    axes.set(xlim=(0.0, spread.draws), xlabel="samples", ylim=(len(there) - 0.5, -0.5))
+    axes.set(xlim=(0.0, spread.draws), xlabel="samples", ylim=(len(there) - 0.55, -0.75))
     axes.tick_params(labelsize=8)
-    _legend_above(axes)
+    for label in axes.get_yticklabels():
+        label.set(fontsize=7.5, linespacing=1.0)
+    colours = [colour for _, colour in parts.values()]
+    for row in range(len(there)):
+        _write_counts(axes, row, [int(counts[row]) for counts, _ in parts.values()], colours)
+    _legend_above(axes, "right")
 
 
-def _legend_above(axes: Any) -> None:
-    """Write the legend in a line above a small panel."""
-    place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.03, 0.96), "ncols": 3}
-    axes.legend(fontsize=8, frameon=False, handlelength=1.0, columnspacing=0.8, **place)
+def _write_counts(axes: Any, row: int, counts: Sequence[int], colours: Sequence[str]) -> None:
+    """Write the counts of a bar's parts in them; side by side above the bar where too narrow."""
+    gap, edge, begin = 3.0, 0.0, 0.0  # gap between texts, and each text's right edge [px]
+    per_sample = axes.bbox.width / axes.get_xlim()[1]
+    for count, colour in zip(counts, colours, strict=True):
+        middle, begin = begin + 0.5 * count, begin + count
+        if not count:
+            continue
+        style: dict[str, Any] = {"fontsize": 8, "ha": "center", "va": "center"}
+        text = axes.text(middle, row, str(count), color=ink_on(to_rgba(colour)), **style)
+        width = text.get_window_extent().width
+        if width + gap > per_sample * count:
+            middle = max(middle, (edge + gap + 0.5 * width) / per_sample)
+            edge = per_sample * middle + 0.5 * width
+            text.set(x=middle, y=row - 0.29, color="black", va="bottom", fontsize=7)
+
+
+def _legend_above(axes: Any, side: Literal["left", "right"]) -> None:
+    """Write the legend in two lines above a small panel, from its left or right edge."""
+    at = 0.0 if side == "left" else 1.03
+    place: dict[str, Any] = {"loc": f"lower {side}", "bbox_to_anchor": (at, 0.96), "ncols": 2}
+    spaces: dict[str, Any] = {"columnspacing": 0.8, "labelspacing": 0.2, "borderpad": 0.2}
+    axes.legend(fontsize=8, frameon=False, handlelength=1.0, **spaces, **place)
 
 
 def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
@@ -262,9 +286,9 @@ def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
     said = textwrap.fill(said, 56)
     if spread.cap < 1.0:
         said += f"\n(utilisation up to {spread.cap:g})"
-    axes.set_title(said, fontsize=9, loc="left", pad=18.0)
+    axes.set_title(said, fontsize=9, loc="left", pad=30.0)
     axes.set(xlabel="load factor [1]", ylabel="samples")
     axes.margins(x=0.04)
     axes.yaxis.get_major_locator().set_params(integer=True)
     axes.tick_params(labelsize=8)
-    _legend_above(axes)
+    _legend_above(axes, "left")

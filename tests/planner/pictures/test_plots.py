@@ -400,3 +400,29 @@ def test_the_heading_of_a_spread_with_a_cap_lies_on_no_label():
     box = heading.get_window_extent()
     labels = [label for axes in figure.axes for label in (axes.xaxis.label, axes.yaxis.label)]
     assert not any(box.overlaps(label.get_window_extent()) for label in labels if label.get_text())
+
+
+def test_numbers_and_legends_of_a_spread_lie_on_nothing_else():
+    asked = ask(on_wall(), "spread", "load_factor")
+    answer = solve.plan(asked)
+    spread = answer.spread
+    for holds, without in ((1, 28), (0, 0), (1, spread.draws - 2), (14, 2), (spread.draws - 1, 1)):
+        kept = structs.replace(spread.kept, holds=holds, without=without)
+        figure = draw_plan(replace(answer, spread=structs.replace(spread, kept=kept)), asked)
+        FigureCanvasAgg(figure).draw()
+        small = [
+            axes for axes in figure.axes if "samples" in (axes.get_xlabel(), axes.get_ylabel())
+        ]
+        texts = [text for axes in small for text in (*axes.texts, *axes.get_legend().get_texts())]
+        texts += [label for axes in small for label in axes.get_xticklabels()]
+        texts += [axes._left_title for axes in small]
+        texts += [axes.yaxis.label for axes in figure.axes]
+        boxes = [text.get_window_extent() for text in texts if text.get_text()]
+        for i, box in enumerate(boxes):
+            assert box.x0 > 0.01 * figure.bbox.width
+            assert not any(box.overlaps(other) for other in boxes[:i])
+        (bars,) = (axes for axes in small if axes.get_xlabel() == "samples")
+        shown = [int(text.get_text()) for text in bars.texts]
+        answers, draws = (spread, kept, spread.feedback), spread.draws
+        parts = [[a.holds, draws - a.holds - a.without, a.without] for a in answers]
+        assert shown == [n for each in parts for n in each if n]
