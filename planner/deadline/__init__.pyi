@@ -3,6 +3,7 @@ from .clock import (
     DeadlineError as DeadlineError,
     Unfinished as Unfinished,
     check as check,
+    check_after as check_after,
     expired as expired,
     late as late,
     late_sentence as late_sentence,

@@ -21,6 +21,7 @@ __all__ = [
     "DeadlineError",
     "Unfinished",
     "check",
+    "check_after",
     "expired",
     "late",
     "late_sentence",
@@ -191,6 +192,28 @@ def check(missing: str) -> None:
     clock = _clock.get()
     if clock is not None and clock.left <= 0.0:
         raise DeadlineError(clock.seconds, missing)
+
+
+def check_after(part: str, took: float) -> None:
+    """Raise `DeadlineError` if the deadline has expired before a plan is looked for.
+
+    Parameters
+    ----------
+    part : str
+        What was done until now, in words that precede "took": ``closing the hands``.
+    took : float
+        Time that it took [s].
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline has expired; the message says how long ago it was set, too.
+    """
+    clock = _clock.get()
+    if clock is not None and clock.left <= 0.0:
+        gone = max(took, time.perf_counter() - clock.end + clock.seconds)
+        words = f"{gone:.2g} s had gone by then, of which {part} took {took:.2g} s"
+        raise DeadlineError(clock.seconds, f"a plan was looked for; {words}")
 
 
 def late(name: Unfinished) -> tuple[Unfinished, ...]:

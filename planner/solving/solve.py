@@ -154,8 +154,8 @@ def answer_on(
         If the deadline passes before a plan passes the checks or is proven infeasible.
     """
     modelled, budget = time.perf_counter(), Budget(SETTINGS.programs)
-    done = "limits were known" if known else "hands were closed on their holds"
-    deadline.check(f"the {done}, which took {modelled - start:.2g} s")
+    done = "knowing the limits" if known else "closing the hands on their holds"
+    deadline.check_after(done, modelled - start)
     checks = prepare_checks(prepared) if known is None else known
     answer: Answer | None = _next_verified(prepared, checks, budget, near)
     if answer is None:

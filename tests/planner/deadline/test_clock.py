@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 import pickle
+import re
 import threading
 import time
 from dataclasses import replace
@@ -199,7 +200,7 @@ def test_time_enough_changes_nothing(clock):
 @pytest.mark.parametrize(
     ("module", "name", "missing"),
     [
-        (prepared_stance, "assemble", "the hands were closed"),
+        (prepared_stance, "assemble", "a plan was looked for"),
         (programs, "unique", "a plan was found"),
     ],
 )
@@ -502,7 +503,8 @@ def test_on_the_command_line_a_deadline_that_is_too_short_is_a_failure(tmp_path,
     assert run_command_line(["plan", str(path), "--json"]) == 1
     out, err = capfd.readouterr()
     assert out == ""
-    assert err.startswith("crux: deadline: 1e-06 s expired before the hands were closed")
+    # where the hands are kept from before, they are closed in time
+    assert re.match(r"crux: deadline: 1e-06 s expired before (the hands were|a plan was) ", err)
     assert err.endswith("; give a longer deadline\n")
     assert err.count("\n") == 1
 
