@@ -239,15 +239,19 @@ def holds_command(
     }
     with tables.writing(output, "--output"), whole_file(output) as part:
         part.write_bytes(msgspec.json.format(msgspec.json.encode(result)))
+    drawings = (picture, "--plot"), (page, "--html")
     if broken is not None:
         kept = (
             f"{len(outcomes):,} of {len(trials):,} places were tried, {len(sampled)} of the best "
             f"sampled; what they hold is in {output}"
         )
+        missing = [field for path, field in drawings if path is not None]
+        if missing:
+            kept += f"; {' and '.join(missing)} {'was' if len(missing) == 1 else 'were'} not drawn"
         if isinstance(broken, CruxError):
             raise CruxError(f"{broken.message}; {kept}")
         raise processes.Interrupted(kept)
-    for path, field in ((picture, "--plot"), (page, "--html")):
+    for path, field in drawings:
         if path is not None:
             with tables.writing(path, field):
                 tables.draw_holds(mesh, trials, outcomes, found, result, path)
