@@ -214,6 +214,12 @@ def test_settings_out_of_range_are_refused(settings, field):
         SurvivalSettings(**settings)
 
 
+def test_no_more_draws_are_planned_anew_than_there_are():
+    assert SurvivalSettings(draws=5).replanned == 5
+    assert SurvivalSettings(draws=5, replanned=2).replanned == 2
+    assert SurvivalSettings().replanned == 100
+
+
 @pytest.mark.slow
 def test_the_formula_is_in_the_simulators_interval_on_random_stances():
     """Of 200 stances, 10,000 draws each; 190 are due, and 180 are asked for."""
