@@ -84,9 +84,10 @@ def warnings(stance: Stance, batch: HandBatch) -> tuple[str, ...]:
             found.extend(f"{place.limb}: {words}" for words in _idle(hand, by_finger))
         end = min(hand.rock_ends)
         if end < reach:
+            near, far = _apart(end, reach)
             found.append(
-                f"{place.limb}: its rock ends {end:.2g} m from the base of a finger, which reaches "
-                f"{reach:.2g} m; the plan may depend on rock that is not given"
+                f"{place.limb}: its rock ends {near} m from the base of a finger, which reaches "
+                f"{far} m; the plan may depend on rock that is not given"
             )
     odd: set[Hold] = set()
     for i, place in enumerate(stance.hands):
@@ -95,6 +96,15 @@ def warnings(stance: Stance, batch: HandBatch) -> tuple[str, ...]:
             odd.add(place.hold)
             found.extend(f"hands[{i}].hold.{each}" for each in words)
     return tuple(found)
+
+
+def _apart(one: float, other: float) -> tuple[str, str]:
+    """Return two numbers with as many digits, two or more, as they need to differ."""
+    for digits in range(2, 17):
+        texts = f"{one:.{digits}g}", f"{other:.{digits}g}"
+        if texts[0] != texts[1]:
+            break
+    return texts
 
 
 def scene_findings(prepared: PreparedStance) -> tuple[Finding, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from hand_models import Cylinder, Grasp, Plane, Pose
 from hand_models.rock import Mesh
 from hand_models.rock.triangles import bridge, cut
 from planner.explanation import warnings
+from planner.explanation.stance_warnings import _apart
 from planner.prepare import HandBatch
 from planner.prepare.settled_stance import settle_stance
 from tests.suite.helpers.hands import HAND, ROCK
@@ -82,3 +84,11 @@ def test_a_plan_warns_of_rock_that_ends_within_a_fingers_reach(hold, ends):
     assert len(told) == ends * len(stance.hands)
     for words, place in zip(told, stance.hands, strict=False):
         assert words.startswith(f"{place.limb}: its rock ends 0.")
+        end, reach = map(float, re.findall(r"([0-9.]+) m", words)[:2])
+        assert end < reach
+
+
+def test_a_warning_of_rock_that_ends_has_digits_that_tell_it_from_the_reach():
+    assert _apart(0.131, 0.134) == ("0.131", "0.134")
+    assert _apart(0.11, 0.134) == ("0.11", "0.13")
+    assert _apart(0.1339999, 0.134) == ("0.1339999", "0.134")
