@@ -9,6 +9,7 @@ from .contact_rest import (
 from .finger_twist import FINGER_TWIST as FINGER_TWIST, twist_arms as twist_arms
 from .hold_trials import (
     AT_BORDER as AT_BORDER,
+    AT_HOLE as AT_HOLE,
     HOLD_RANKS as HOLD_RANKS,
     REFUSAL_WORDS as REFUSAL_WORDS,
     FoundHold as FoundHold,

@@ -34,6 +34,7 @@ from hand_models.tile import Surface
 
 __all__ = [
     "AT_BORDER",
+    "AT_HOLE",
     "HOLD_RANKS",
     "REFUSAL_WORDS",
     "FoundHold",
@@ -46,6 +47,9 @@ __all__ = [
 
 AT_BORDER: Final = "the scan ends, or has a hole, within a finger's reach"
 """Message for a place where a finger may reach the scan's border, so that no hand is tried."""
+
+AT_HOLE: Final = "the scan has a hole within a finger's reach"
+"""Message for a place where a finger may reach holes of the scan, but not its outline."""
 
 REFUSAL_WORDS: Final = {
     "scan_border": AT_BORDER,
@@ -125,15 +129,18 @@ class FoundHold(NamedTuple):
         return impossible_forces(pure, support)
 
 
-def _at_border(hand: SpinyHand, settled: SettledHand) -> bool:
-    """Return True if a scan ends within a finger's reach, or has no rock at all for one."""
-    if min(settled.rock_ends) < hand.finger.reach:
-        return True
+def _border_message(hand: SpinyHand, settled: SettledHand) -> str | None:
+    """Return the message if a scan ends within a finger's reach, or has no rock at all for one."""
+    reach = hand.finger.reach
+    if min(settled.rock_ends) < reach:
+        outline = min(settled.distances_to(settled.hold.outline))
+        return AT_BORDER if outline < reach else AT_HOLE
     off = (settled.postures.kinds == CONTACT_KINDS.index("none")).all(axis=1)
     at = settled.hold, settled.grasp, settled.seating.pose
-    return bool(len(settled.hold.border)) and any(
+    without = bool(len(settled.hold.border)) and any(
         hand.section(name, *at) is None for name in np.array(FINGERS)[off].tolist()
     )
+    return AT_BORDER if without else None
 
 
 def closed_holds(
@@ -166,8 +173,8 @@ def closed_holds(
         rests = iter(placed_by_contact(hand, seated))
         outcomes = [next(rests) if isinstance(each, SettledHand) else each for each in outcomes]
     return [
-        RefusedPlaceError(AT_BORDER, reason="scan_border", field="place.point")
-        if isinstance(each, SettledHand) and _at_border(hand, each)
+        RefusedPlaceError(words, reason="scan_border", field="place.point")
+        if isinstance(each, SettledHand) and (words := _border_message(hand, each)) is not None
         else each
         for each in outcomes
     ]

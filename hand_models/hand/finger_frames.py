@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -13,7 +15,15 @@ from hand_models.hand.names import FINGERS
 from hand_models.rock import Hold
 from hand_models.sections import FingerRock, FingerSize, Section
 
-__all__ = ["HAND_Z", "OUTER_FINGERS", "STACK_ROWS", "TILE_COLUMNS", "FingerFrame", "FrameStack"]
+__all__ = [
+    "HAND_Z",
+    "OUTER_FINGERS",
+    "STACK_ROWS",
+    "TILE_COLUMNS",
+    "FingerFrame",
+    "FrameStack",
+    "border_distances",
+]
 
 OUTER_FINGERS: Final = slice(0, len(FINGERS), len(FINGERS) - 1)
 """Slice of `FINGERS` with the two outer fingers, which have a base tile."""
@@ -189,3 +199,27 @@ class FrameStack:
             for hand in zip(joints, alongs, acrosses, strict=True)
         ]
         return cls(tuple(hands), *stacks)
+
+
+def border_distances(frames: Iterable[FingerFrame], border: Array) -> tuple[float, ...]:
+    """Return the distance from each finger's joint to a border in the finger's plane [m].
+
+    Parameters
+    ----------
+    frames : iterable of FingerFrame
+    border : ndarray, shape (n, 2, 3)
+        End points of its edges, in H [m].
+
+    Returns
+    -------
+    tuple of float
+        Infinite where the finger's plane does not cut the border.
+    """
+    found = []
+    for frame in frames:
+        off = (border - frame.joint) @ frame.across
+        cut = (off[:, 0] < 0.0) != (off[:, 1] < 0.0)
+        (p, q), (a, b) = off[cut].T, (border[cut] - frame.joint).transpose(1, 0, 2)
+        points = (p[:, None] * b - q[:, None] * a) / (p - q)[:, None]
+        found.append(float(np.linalg.norm(points, axis=1).min(initial=math.inf)))
+    return tuple(found)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, BoundedStore, Indices
 from hand_models.finger import CONTACT_KINDS, JOINT_STOPS, Contact, FingerModel, SettledFinger
+from hand_models.hand.finger_frames import border_distances
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
 from hand_models.hand.names import CONTACT_NAMES, FINGERS, FINGERTIP_FORCE, NAIL, NAIL_SHEAR
@@ -335,18 +336,14 @@ class SettledHand:
 
         Infinite where the hold has no border or the plane does not cut it.
         """
-        border = self.hold.border
+        return self.distances_to(self.hold.border)
+
+    def distances_to(self, border: Array) -> tuple[float, ...]:
+        """Return distances as `rock_ends`, to a border in the hold's frame, shape (n, 2, 3) [m]."""
         if not len(border):
             return (math.inf,) * len(FINGERS)
-        ends = self.seating.pose.apply(border)
-        found = []
-        for frame in self.hand.frames(self.grasp.outer_rotation):
-            off = (ends - frame.joint) @ frame.across
-            cut = (off[:, 0] < 0.0) != (off[:, 1] < 0.0)
-            (p, q), (a, b) = off[cut].T, (ends[cut] - frame.joint).transpose(1, 0, 2)
-            points = (p[:, None] * b - q[:, None] * a) / (p - q)[:, None]
-            found.append(float(np.linalg.norm(points, axis=1).min(initial=math.inf)))
-        return tuple(found)
+        frames = self.hand.frames(self.grasp.outer_rotation)
+        return border_distances(frames, self.seating.pose.apply(border))
 
     def nail_limits(self, tile: int) -> tuple[HalfPlane, HalfPlane]:
         """Return two limits of a nail's force: toward its finger's base, and into the rock.

@@ -43,6 +43,11 @@ class Hold(ABC):
         return np.zeros((0, 2, 3))
 
     @property
+    def outline(self) -> Array:
+        """Edges of the border that go around no hole of the known rock, shape (n, 2, 3) [m]."""
+        return self.border
+
+    @property
     def oddities(self) -> tuple[str, ...]:
         """Warnings about the hold's data, which is used nevertheless; each begins with a field."""
         return ()

@@ -23,7 +23,8 @@ from hand_models.rock.smoothing import Heights, OutlinedHold
 from hand_models.rock.surface import Triangles
 from hand_models.rock.triangles import (
     TriangleCells,
-    border_edges,
+    around_holes,
+    border_pairs,
     bridge,
     cut,
     weld,
@@ -97,7 +98,16 @@ class Mesh(OutlinedHold):
 
     @cached_property
     def border(self) -> Array:
-        return border_edges(self.triangles, self._scale.bridged_gap)
+        return np.asarray(self.triangles.vertices[self._border_pairs])
+
+    @cached_property
+    def outline(self) -> Array:
+        holes = around_holes(self.triangles, self._border_pairs)
+        return np.asarray(self.border[~holes])
+
+    @cached_property
+    def _border_pairs(self) -> Indices:
+        return border_pairs(self.triangles, self._scale.bridged_gap)
 
     @cached_property
     def oddities(self) -> tuple[str, ...]:

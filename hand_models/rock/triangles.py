@@ -20,7 +20,8 @@ from hand_models.sections import strung
 
 __all__ = [
     "TriangleCells",
-    "border_edges",
+    "around_holes",
+    "border_pairs",
     "bridge",
     "connected",
     "cut",
@@ -196,19 +197,10 @@ def without_spikes(triangles: Triangles, ratio: float) -> Triangles:
     return Triangles(np.where(spike[:, None], mean, vertices), faces)
 
 
-def border_edges(triangles: Triangles, gap: float) -> Array:
-    """Return the border edges of a mesh: those that only one triangle has.
+def border_pairs(triangles: Triangles, gap: float) -> Indices:
+    """Return the border edges of a mesh, those that only one triangle has, as pairs of vertices.
 
-    Parameters
-    ----------
-    triangles : Triangles
-    gap : float
-        Borders of holes no wider than this along every axis are left out [m].
-
-    Returns
-    -------
-    ndarray, shape (n, 2, 3)
-        End points of each edge [m].
+    Borders of holes no wider than ``gap`` [m] along every axis are left out. Shape (n, 2).
     """
     vertices, faces = triangles
     ends, count = edges_of(faces), len(vertices)
@@ -219,7 +211,26 @@ def border_edges(triangles: Triangles, gap: float) -> Array:
     np.minimum.at(low, part, vertices)
     np.maximum.at(high, part, vertices)
     wide = ((high - low) > gap).any(axis=1)
-    return np.asarray(vertices[edges[wide[part[edges[:, 0]]]]])
+    return np.asarray(edges[wide[part[edges[:, 0]]]])
+
+
+def around_holes(triangles: Triangles, border: Indices) -> NDArray[np.bool_]:
+    """Return which border edges go around a hole, shape (n,).
+
+    The longest border of each part of the surface, by the diagonal of its box, is no hole's but
+    the part's outline.
+    """
+    vertices, faces = triangles
+    count = len(vertices)
+    # two edges of a triangle connect it
+    sides = np.concatenate([faces[:, :2], faces[:, 1:]])
+    part, loop = connected(sides, count), connected(border, count)
+    hole, outlined = np.zeros(count, np.bool_), set[int]()
+    loops = grouped(np.unique(border), loop)
+    for each in sorted(loops, key=lambda at: -float(np.linalg.norm(np.ptp(vertices[at], axis=0)))):
+        hole[each] = part[each[0]] in outlined
+        outlined.add(int(part[each[0]]))
+    return hole[border[:, 0]]
 
 
 def cut(

@@ -13,6 +13,7 @@ from rich.console import Console
 
 from hand_models.base import Array, InvalidInputError, RefusedPlaceError
 from hand_models.fixed_wrist import (
+    AT_HOLE,
     FORCE_TOLERANCE,
     REFUSAL_WORDS,
     TRIAL_WAYS,
@@ -202,6 +203,12 @@ def print_holds(
         rows = [(kind, f"{count:,}", words[kind]) for kind, count in without.items()]
         columns = [name("kind", "0"), number("places", "1"), text("why", "2")]
         print_rows(rows, columns, out, "places without a hold")
+    holes = result["reasons"].get(AT_HOLE, 0)
+    if holes:
+        out.print(
+            f"{holes:,} of these places are at holes of the scan, away from its outline; a larger "
+            "--hole of `crux rock` may close them"
+        )
 
 
 def _ways(ways: Iterable[str]) -> str:

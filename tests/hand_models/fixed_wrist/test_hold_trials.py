@@ -11,6 +11,7 @@ from hand_models import Cylinder, Grasp, InvalidInputError, Pose, place
 from hand_models.base import RefusedPlaceError, turns_about
 from hand_models.fixed_wrist import (
     AT_BORDER,
+    AT_HOLE,
     TRIAL_WAYS,
     FoundHold,
     HoldTrial,
@@ -26,7 +27,7 @@ from hand_models.fixed_wrist import (
 from hand_models.hand import Placement
 from hand_models.rock import Mesh
 from tests.suite.helpers.hands import HAND, ROCK
-from tests.suite.helpers.rocks import cylinder_mesh, fractal_wall
+from tests.suite.helpers.rocks import cylinder_mesh, fractal_wall, height_map
 
 RADIUS = 0.055
 PLACED = 4
@@ -168,6 +169,27 @@ def test_each_refused_place_has_its_kind():
     slack = Placement(Cylinder(0.3), ROCK, Grasp(math.pi, closing_tension=1.0), None)
     found = HAND.settle_each([deep, deep._replace(hold_in_hand=tilted), slack])
     assert [each.reason for each in found] == ["palm_in_rock", "finger_in_rock", "tendon_slack"]
+
+
+def test_a_place_near_a_hole_of_a_scan_is_not_called_one_at_its_end():
+    vertices, faces = height_map(np.zeros((121, 121)), 4e-3)
+    middles = vertices[faces].mean(axis=1)
+    hole = np.abs(middles[:, :2] - [0.1, 0.0]).max(axis=1) < 0.03
+    whole = Mesh(vertices, faces, anywhere=True)
+    holed = Mesh(vertices, faces[~hole], anywhere=True)
+
+    def messages(rock: Mesh, x: float) -> set[str]:
+        trials = [
+            HoldTrial((x, 0.0, 0.0), (0.0, 0.0, 1.0), 0.5 * math.pi * turn, 0.0)
+            for turn in range(4)
+        ]
+        found = try_holds(HAND, rock, ROCK, trials)
+        return {each.message for each in found if isinstance(each, RefusedPlaceError)}
+
+    assert messages(whole, 0.0) == set()
+    assert messages(holed, 0.0) == {AT_HOLE}
+    # at the outline it is the outline, hole or not
+    assert messages(whole, -0.2) == messages(holed, -0.2) == {AT_BORDER}
 
 
 def test_a_refused_place_keeps_its_kind_on_the_way_from_a_worker():

@@ -47,6 +47,20 @@ def test_the_border_of_a_wall_is_its_outline_and_that_of_wide_holes():
     assert len(wall(20, (0.0, 0.0, 0.0061)).border) == 4 * 19 + 4 * 3
 
 
+def test_the_outline_is_the_border_without_holes():
+    whole, holed = wall(20), wall(20, (0.0, 0.0, 0.0061))
+    np.testing.assert_array_equal(whole.outline, whole.border)
+    assert len(holed.outline) == 4 * 19
+    assert np.abs(holed.outline).max(axis=2).min() == pytest.approx(np.abs(whole.border).max())
+    # each part of the surface has an outline
+    two = [wall(20), wall(12, (0.0, 0.0, 0.0061))]
+    vertices = np.concatenate([two[0].triangles.vertices, two[1].triangles.vertices + 1.0])
+    faces = [two[0].triangles.faces, two[1].triangles.faces + len(two[0].triangles.vertices)]
+    both = Mesh(vertices, np.concatenate(faces))
+    assert len(both.border) == 4 * 19 + 4 * 11 + 4 * 3
+    assert len(both.outline) == 4 * 19 + 4 * 11
+
+
 @given_some(5, 60, seeds)
 def test_rock_ends_where_a_fingers_cut_does(seed):
     rng = np.random.default_rng(seed)

@@ -9,11 +9,12 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 import trimesh
 
 from hand_models.base import CruxError, InvalidInputError
-from hand_models.fixed_wrist import AT_BORDER, grid_of_trials, try_holds
+from hand_models.fixed_wrist import AT_BORDER, AT_HOLE, grid_of_trials, try_holds
 from hand_models.hand import spiny_hand
 from hand_models.parameters import hand_table
 from hand_models.rock import Mesh, read_mesh
@@ -24,7 +25,7 @@ from service.processes import Interrupted
 from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, complaint, result
 from tests.suite.helpers.processes import begun, ended, until, watched, workers
 from tests.suite.helpers.requests import pose_of, wall_request
-from tests.suite.helpers.rocks import cylinder_mesh
+from tests.suite.helpers.rocks import cylinder_mesh, height_map
 
 COARSE = ["--spacing", "0.15", "--angles", "1", "--outer-rotation", "0"]
 
@@ -244,6 +245,24 @@ def test_where_no_hand_comes_to_rest_the_hint_says_so(tmp_path, capfd):
         assert ("nothing holds: closed hands come to rest nowhere" in told) != rests
         assert "does z of the file point" not in told
         assert ("--placing given" in told) != rests
+
+
+def test_places_at_holes_of_a_scan_are_counted_with_what_may_close_them(tmp_path, capfd):
+    vertices, faces = height_map(np.zeros((121, 121)), 4e-3)
+    hole = np.abs(vertices[faces].mean(axis=1)[:, :2] - [0.1, 0.0]).max(axis=1) < 0.03
+    for name, some in (("whole", faces), ("holed", faces[~hole])):
+        scan, output = tmp_path / f"{name}.ply", tmp_path / f"{name}.json"
+        trimesh.Trimesh(vertices, some, process=False).export(scan)
+        grid = ["--spacing", "0.06", "--angles", "2", "--outer-rotation", "0"]
+        options = ["-o", str(output), *grid, "--robust", "0", "--workers", "1"]
+        assert run_command_line(["holds", str(scan), *options]) == DONE
+        reasons = json.loads(output.read_text(encoding="utf-8"))["reasons"]
+        count, said = reasons.get(AT_HOLE, 0), " ".join(capfd.readouterr().out.split())
+        assert reasons[AT_BORDER] > 0
+        assert (count > 0) == (name == "holed")
+        words = f"{count} of these places are at holes of the scan, away from its outline"
+        assert (words in said) == (count > 0)
+        assert ("--hole" in said) == (count > 0)
 
 
 def test_what_was_tried_is_kept_when_the_rest_is_broken_off(rock, tmp_path, monkeypatch):
