@@ -98,14 +98,13 @@ class Mesh(OutlinedHold):
 
     @cached_property
     def border(self) -> Array:
-        return np.asarray(self.triangles.vertices[self._border_pairs])
+        return np.asarray(self.triangles.vertices[self._border_pairs()])
 
     @cached_property
     def outline(self) -> Array:
-        holes = around_holes(self.triangles, self._border_pairs)
+        holes = around_holes(self.triangles, self._border_pairs())
         return np.asarray(self.border[~holes])
 
-    @cached_property
     def _border_pairs(self) -> Indices:
         return border_pairs(self.triangles, self._scale.bridged_gap)
 

@@ -207,14 +207,14 @@ def draw_answers(axes: Any, spread: Spread) -> None:
     ----------
     axes : Axes
     spread : Spread
-        Each of its answers is a bar: feasible, overloaded and without balance.
+        Each of its answers is a bar: feasible, overloaded (or dragged) and without balance.
     """
     there = {textwrap.fill(words, 12): each for words, each in spread.answers.items()}
     holds = np.array([each.holds for each in there.values()])
     without = np.array([each.without for each in there.values()])
     parts = {
         "feasible": (holds, COLOUR_OF["green"]),
-        "overloaded": (spread.draws - holds - without, COLOUR_OF["amber"]),
+        spread.failing: (spread.draws - holds - without, COLOUR_OF["amber"]),
         "no balance": (without, "0.3"),
     }
     left = np.zeros(len(there))
