@@ -72,9 +72,8 @@ class Quantiles(Struct, frozen=True):
         import numpy as np
 
         there = [value for value in values if value is not None]
-        percents = (
-            (5.0, 50.0, 95.0) if len(there) >= SPREAD_SETTINGS.many_draws else (0.0, 50.0, 100.0)
-        )
+        many = len(there) >= SPREAD_SETTINGS.many_draws
+        percents = (5.0, 50.0, 95.0) if many else (0.0, 50.0, 100.0)
         return cls(*np.percentile(there, percents).tolist()) if there else None
 
 
@@ -119,8 +118,7 @@ class SentSpread(Struct, frozen=True):
         if plans is None:
             return None
         used = [each.utilisation for each in plans]
-        holds = sum(each.holds for each in plans)
-        return cls(holds, used.count(None), Quantiles.of(used), used)
+        return cls(sum(x.holds for x in plans), used.count(None), Quantiles.of(used), used)
 
 
 class Influence(Struct, frozen=True):
@@ -292,8 +290,7 @@ class Spread(Struct, frozen=True):
             Source of each uncertain parameter, by name.
         """
         used, factors = [p.utilisation for p in plans], [p.load_factor for p in plans]
-        some = any(factor is not None for factor in factors)
-        influences = [_sourced(each, sources) for each in _influences(factors, drawn)]
+        influences = _sourced(_influences(factors, drawn), sources)
         rock_share, apart = _apart(factors, drawn)
         carried = [
             0.0 if factor is None and (u is None or u > 1.0) else factor
@@ -306,13 +303,13 @@ class Spread(Struct, frozen=True):
             cap=cap,
             refused=dict(refused),
             utilisation=Quantiles.of(used),
-            load_factor=Quantiles.of(carried) if some else None,
+            load_factor=Quantiles.of(carried) if any(f is not None for f in factors) else None,
             hangs_on=influences,
             utilisations=used,
             load_factors=factors,
             sensitive_to=influences,
             rock_share=rock_share,
-            rock_apart=[_sourced(each, sources) for each in apart],
+            rock_apart=_sourced(apart, sources),
             threshold=threshold,
             kept=SentSpread.of(kept),
             feedback=SentSpread.of(feedback),
@@ -325,9 +322,8 @@ def _influences(factors: Sequence[float | None], drawn: Mapping[str, Array]) -> 
 
     there = [k for k, factor in enumerate(factors) if factor is not None]
     found = np.array([factors[k] for k in there], dtype=float)
-    # of fewer than three a correlation says nothing
     if len(found) < 3 or np.ptp(found) <= SPREAD_SETTINGS.least_variation * np.abs(found).max():
-        return []
+        return []  # of fewer than three a correlation says nothing
     b = _centred_ranks(found, SPREAD_SETTINGS.least_variation * np.abs(found).max())
     shares: dict[bytes, Influence] = {}
     for name, values in drawn.items():
@@ -339,8 +335,8 @@ def _influences(factors: Sequence[float | None], drawn: Mapping[str, Array]) -> 
     return sorted(shares.values(), key=lambda each: -each.share)[:3]  # the largest
 
 
-def _sourced(influence: Influence, sources: Mapping[str, str]) -> Influence:
-    return Influence(influence.quantity, influence.share, sources.get(influence.quantity, ""))
+def _sourced(found: Sequence[Influence], sources: Mapping[str, str]) -> list[Influence]:
+    return [Influence(each.quantity, each.share, sources.get(each.quantity, "")) for each in found]
 
 
 def _apart(
@@ -367,9 +363,8 @@ def _apart(
             # a quantity that goes with one before says the same
             others.setdefault(own.round(9).tobytes(), (name, own))
     # two more than numbers that are fitted, or nothing is left
-    if len(there) < len(columns) + 2:
-        return None, []
-    if np.ptp(found) <= SPREAD_SETTINGS.least_variation * np.abs(found).max():
+    few = len(there) < len(columns) + 2
+    if few or np.ptp(found) <= SPREAD_SETTINGS.least_variation * np.abs(found).max():
         return None, []
     explained = np.linalg.qr(np.column_stack(columns))[0]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from hashlib import blake2b
 from io import FileIO
@@ -120,8 +120,9 @@ class Run(ABC):
         """
         line, outcome = self._line(question, payload, seconds)
         if self._out is not None:
-            _append(line, self._out)
-        self.tally.add(*outcome)
+            _append(line, self._out, lambda: self.tally.add(*outcome))
+        else:
+            self.tally.add(*outcome)
 
     @abstractmethod
     def _line(self, question: bytes, payload: bytes, seconds: float) -> tuple[bytes, _Outcome]:
@@ -169,15 +170,16 @@ def _quoted(line: bytes) -> str:
     return repr(line[:40].decode(errors="replace"))
 
 
-def _append(line: bytes, out: FileIO) -> None:
-    written = 0
+def _append(line: bytes, out: FileIO, count: Callable[[], object] = bool) -> None:
+    """Write a line and count it. Wherever a signal comes, a line in the file is one that counts."""
+    begin, written = out.seek(0, 2), 0
     try:
         while written < len(line):
             written += out.write(line[written:])
+        count()
     except BaseException:
-        # a line that is cut off would be read by nobody
         with suppress(OSError):
-            out.truncate(out.seek(0, 2) - written)
+            out.truncate(out.seek(begin))
         raise
 
 

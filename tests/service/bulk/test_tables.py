@@ -8,6 +8,7 @@ import json
 import os
 import signal
 import sys
+from io import FileIO
 from pathlib import Path
 
 import msgspec
@@ -17,6 +18,7 @@ from hand_models.base import InvalidInputError
 from service.answering import dispatch
 from service.bulk import chosen_columns, columns_of, row_of
 from service.bulk.chunks import BulkSettings
+from service.bulk.runs import ReplyLines
 from service.commands.cli import run_command_line
 from tests.service.commands.test_interruption import limited
 from tests.suite.helpers.commands import BAD_INPUT, FAILED, OVERLOADED, complaint
@@ -374,3 +376,28 @@ def test_a_table_leaves_out_displaced_hands(tmp_path, capfd):
     (row,) = content(path)
     assert row["status"] == "optimal"
     assert float(row["front_left_pose_target_vx_m"]) != 0.0
+
+
+class LateSignal(FileIO):
+    """A file in which a signal arrives just after a line is written."""
+
+    late = False
+
+    def write(self, line):
+        written = super().write(line)
+        if self.late:
+            raise KeyboardInterrupt
+        return written
+
+
+def test_a_line_in_the_file_is_one_that_counts_wherever_a_signal_comes(tmp_path):
+    reply = b'{"v":1,"status":"optimal"}'
+    run = ReplyLines(tmp_path / "replies.jsonl", shown=False, resume=False, asked=None)
+    with LateSignal(run.file, "wb") as out:
+        run._out = out
+        run.write(b"{}", reply, 0.1)
+        out.late = True
+        with pytest.raises(KeyboardInterrupt):
+            run.write(b"{}", reply, 0.1)
+    assert run.file.read_bytes() == reply + b"\n"
+    assert run.tally.count == 1

@@ -41,8 +41,13 @@ def _text(part: Any) -> str:
 
 def _bare(part: Any) -> Any:
     if isinstance(part, dict):
-        return {key: _bare(value) for key, value in part.items() if key != "description"}
+        return {key: _bare(value) for key, value in part.items() if not _left_out(key, value)}
     return [_bare(each) for each in part] if isinstance(part, list) else part
+
+
+def _left_out(key: str, value: Any) -> bool:
+    """Words, and which keys a mapping has: msgspec says these since version 0.23."""
+    return key == "description" or (key == "propertyNames" and "enum" in value)
 
 
 FILES = {"Request": KEPT / "requests.schema", "Reply": KEPT / "replies.schema"}
