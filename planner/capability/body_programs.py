@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -101,12 +101,6 @@ class BodyPrograms:
         Effect of the body's acceleration; None if the question gives a body wrench.
     exact : bool
         Whether all wrists are fixed, so that no set is linearised.
-    cap_at_needed : float or None
-        Utilisation cap for searches from the question's body wrench: the question's cap, or
-        slightly more where the least utilisation equals that cap; None if infeasible.
-    at_rest : tuple of (StanceData, float), or None
-        Scaled rows of the hands with the body at rest, and utilisation cap; None if the body is
-        infeasible at rest, or without ``motion``.
     """
 
     def __init__(self, question: Question) -> None:
@@ -118,10 +112,7 @@ class BodyPrograms:
         self.exact = not self._hands.floating
         self._spaces, data = self._hands.sets(self._point)
         self.data = _with_idle(data, question, where)
-        self.motion = motion = _motion(self.question, where, self._point)
-        self.cap_at_needed = self._cap_of(self.data)
-        cap = None if motion is None else self._cap_of(motion.rest)
-        self.at_rest = None if motion is None or cap is None else (motion.rest, cap)
+        self.motion = _motion(self.question, where, self._point)
         limbs = [hand.limb for hand in question.stance.hands]
         self._names = [
             [limit_name(limb, row) for row in space.rows[: len(space.s)]]
@@ -136,6 +127,24 @@ class BodyPrograms:
     def cap(self) -> float:
         """Cap on the utilisation, from the question's limits."""
         return self.question.limits.utilisation
+
+    @cached_property
+    def cap_at_needed(self) -> float | None:
+        """Utilisation cap for searches from the question's body wrench; None if infeasible.
+
+        The question's cap, or slightly more where the least utilisation equals that cap.
+        """
+        return self._cap_of(self.data)
+
+    @cached_property
+    def at_rest(self) -> tuple[StanceData, float] | None:
+        """Scaled rows of the hands with the body at rest, and utilisation cap.
+
+        None if the body is infeasible at rest. Requires ``motion``.
+        """
+        assert self.motion is not None
+        cap = self._cap_of(self.motion.rest)
+        return None if cap is None else (self.motion.rest, cap)
 
     def _cap_of(self, data: StanceData) -> float | None:
         """Return the utilisation to go up to, where a balance can be had within it."""
