@@ -96,17 +96,20 @@ class Mesh(OutlinedHold):
         if not anywhere:
             self.check_place()
 
-    @cached_property
+    @property
     def border(self) -> Array:
-        return np.asarray(self.triangles.vertices[self._border_pairs()])
+        return self._border[1]
 
     @cached_property
     def outline(self) -> Array:
-        holes = around_holes(self.triangles, self._border_pairs())
-        return np.asarray(self.border[~holes])
+        pairs, border = self._border
+        return border[~around_holes(self.triangles, pairs)]
 
-    def _border_pairs(self) -> Indices:
-        return border_pairs(self.triangles, self._scale.bridged_gap)
+    @cached_property
+    def _border(self) -> tuple[Indices, Array]:
+        """Edges of the border as pairs of vertices, and their end points [m]."""
+        pairs = border_pairs(self.triangles, self._scale.bridged_gap)
+        return pairs, np.asarray(self.triangles.vertices[pairs])
 
     @cached_property
     def oddities(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 from hand_models.base import Array, compiled
 from hand_models.sections.section import Complexes
 
-__all__ = ["bounds_of_blocks", "rock_distances"]
+__all__ = ["bounds_of_blocks", "least_distance", "rock_distances"]
 
 
 @compiled()
