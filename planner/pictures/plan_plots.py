@@ -81,7 +81,7 @@ def draw_plan(plan: Plan, question: Question) -> Figure:
     if plan.spread is not None and plan.spread.load_factor is not None:
         draw_spread(figure.add_axes((0.045, bottom, 0.14, 0.11)), plan.spread, plan.load_factor)
         draw_answers(figure.add_axes((0.265, bottom, 0.09, 0.11)), plan.spread)
-        under = 0.3
+        under = 0.34
     space = figure.add_gridspec(1, 1, left=0.02, right=0.37, bottom=under, top=top)
     _draw_space(figure, space[0], scene, seen)
     sides = figure.add_gridspec(2, 1, left=0.425, right=0.605, hspace=0.3, **places)

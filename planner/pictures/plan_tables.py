@@ -224,7 +224,7 @@ def draw_answers(axes: Any, spread: Spread) -> None:
     axes.set(xlim=(0.0, spread.draws), xlabel="samples", ylim=(len(there) - 0.55, -0.75))
     axes.tick_params(labelsize=8)
     for label in axes.get_yticklabels():
-        label.set(fontsize=7.5, linespacing=1.0)
+        label.set(linespacing=1.0)
     colours = [colour for _, colour in parts.values()]
     for row in range(len(there)):
         _write_counts(axes, row, [int(counts[row]) for counts, _ in parts.values()], colours)
@@ -245,7 +245,7 @@ def _write_counts(axes: Any, row: int, counts: Sequence[int], colours: Sequence[
         if width + gap > per_sample * count:
             middle = max(middle, (edge + gap + 0.5 * width) / per_sample)
             edge = per_sample * middle + 0.5 * width
-            text.set(x=middle, y=row - 0.29, color="black", va="bottom", fontsize=7)
+            text.set(x=middle, y=row - 0.29, color="black", va="bottom")
 
 
 def _legend_above(axes: Any, side: Literal["left", "right"]) -> None:
