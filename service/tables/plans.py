@@ -77,6 +77,9 @@ def print_plan(
         _print_displaced(reply, out)
         return
     print_warnings(reply.warnings, out)
+    if reply.margin_share == 1.0:
+        # less is among the warnings
+        out.print("the margins that are kept if possible are kept in full")
     for limb, pose in (reply.poses or {}).items():
         where = ", ".join(f"{value:.4f}" for value in pose.position)
         turned = ", ".join(f"{value:.4f}" for value in pose.orientation)

@@ -85,3 +85,13 @@ def test_clearance_is_told_where_it_is_wanted(sound, capsys):
     shown = capsys.readouterr().out
     assert "least distances" in shown
     assert "not measured: links" in shown
+
+
+@pytest.mark.parametrize(("margin", "kept"), [(2.0, True), (20.0, False)])
+def test_margins_that_are_kept_in_full_are_shown(sound, capsys, margin, kept):
+    limits = sound.get("limits", {}) | {"margins": "if_possible", "hold_margin": margin}
+    reply = answered(sound | {"limits": limits})
+    assert (reply["margin_share"] == 1.0) is kept
+    print_plan(msgspec.convert(reply, PlanReply), console())
+    shown = capsys.readouterr().out
+    assert ("kept in full" in shown) is kept
