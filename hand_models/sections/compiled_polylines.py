@@ -119,7 +119,7 @@ def nearest_segments(
     away, nearest, near, count = np.empty((len(points), 2)), 0, np.empty(len(spans), np.intp), 0
     # points follow each other: blocks that may have what is nearest to one are so for those that
     # are no farther from it than this
-    reach = 8.0 * longest.max() if len(longest) else 0.0  # [m]
+    reach = 4.0 * longest.mean() if len(longest) else 0.0  # [m]
     s_0, t_0, far = math.inf, math.inf, 0.0
     for i in range(len(points)):
         s, t = points[i]
@@ -127,7 +127,8 @@ def nearest_segments(
         _, x, y = _from_segment(vertices, nearest, s, t)
         least = math.sqrt(x * x + y * y) * (1.0 + 1e-12) + 1e-15  # [m] it is found once more
         moved, square = math.sqrt((s - s_0) ** 2 + (t - t_0) ** 2), math.inf
-        if least > far - moved:
+        # and the first point may be far from the first segment, and so have all of them
+        if least > far - moved or far > 2.0 * (least + 2.0 * reach):
             s_0, t_0, far, count = s, t, least + 2.0 * reach, 0
             for block in range(len(spans)):
                 near[count] = block
