@@ -16,6 +16,9 @@ __all__ = ["Interrupted", "interruptible", "kill_children"]
 
 ENDING_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
+IMPORTING: Final = "_frozen_importlib"
+"""Name of the module whose functions import modules."""
+
 
 class Interrupted(BaseException):
     """Exception that SIGINT or SIGTERM raises in the main thread of a command.
@@ -50,9 +53,15 @@ def interruptible() -> Iterator[None]:
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
     """Answer the first signal: let the command end by itself, but not for ever."""
+    above = set(_modules_above(frame))
+    if "numba" in above and IMPORTING not in above:
+        # a compiled function that takes its arguments goes on whatever is raised there, and what
+        # comes of that is an error of another kind: the signal comes again
+        threading.Timer(0.01, os.kill, (os.getpid(), number)).start()  # [s]
+        return
     for each in ENDING_SIGNALS:
         signal.signal(each, _end)
-    if _importing(frame):
+    if IMPORTING in above:
         # extension modules turn what is raised into errors of their own, or print it
         _end()
     # [s] to keep what is done, and to end
@@ -62,13 +71,11 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     raise Interrupted
 
 
-def _importing(frame: FrameType | None) -> bool:
+def _modules_above(frame: FrameType | None) -> Iterator[str]:
+    """Yield the packages whose functions are being run, of a frame and of all that called it."""
     while frame is not None:
-        # the file of the frames below a module that is being imported
-        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
-            return True
+        yield frame.f_globals.get("__name__", "").partition(".")[0]
         frame = frame.f_back
-    return False
 
 
 def _end(number: int = 0, frame: FrameType | None = None) -> None:

@@ -233,3 +233,39 @@ def test_standard_streams_that_are_closed_cost_nothing_but_themselves(missing):
     )
     assert (done.returncode, done.stderr) == (DONE, "")
     assert (done.stdout == "") == (" >&-" in f" {missing}")
+
+
+TAKING_ITS_ARGUMENTS = """
+import os, signal
+from numba import float64, njit, types
+from numba.core import serialize
+from service.processes import interruptible
+
+@njit(float64(float64))
+def more(x):
+    return x + 1.0
+
+@njit(float64(types.FunctionType(float64(float64)), float64))
+def of(function, x):
+    return function(x)
+
+class Interrupting(dict):
+    def __getitem__(self, key):
+        if not self.sent:
+            self.sent = True
+            os.kill(os.getpid(), signal.SIGINT)
+        return super().__getitem__(key)
+
+with interruptible():
+    of(more, 1.0)
+    serialize._unpickled_memo = Interrupting(serialize._unpickled_memo)
+    serialize._unpickled_memo.sent = False
+    while True:
+        of(more, 1.0)
+"""
+
+
+def test_a_signal_while_a_compiled_function_takes_its_arguments_is_answered_after_it():
+    called = [sys.executable, "-W", "ignore", "-c", TAKING_ITS_ARGUMENTS]
+    done = subprocess.run(called, capture_output=True, text=True, cwd=ROOT, check=False)
+    assert (done.returncode, done.stderr) == (FAILED, "crux: interrupted\n")
