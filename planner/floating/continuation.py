@@ -262,8 +262,8 @@ def _way(hands: HandSets, start: WristSolution, budget: Budget) -> _Way | None:
         slope = _slope(hands, now)
         aim = math.inf if used < 1.0 else 0.0
         if slope > 1e-3:  # it gets harder with the load
-            # a little beyond 1 the next search may end as far beyond it as this one
-            wanted = 1.0 - 0.5 * near if 1.0 < used < 1.0 + near else 1.0
+            # from beyond 1 a search may end a little beyond it again
+            wanted = 1.0 if used < 1.0 else 1.0 - 0.5 * near
             aim = factor + (wanted - used) / slope
         if aim < least and factor <= SETTINGS.small_factors[0]:
             # what overloads the hands is not the body wrench

@@ -218,10 +218,12 @@ def _relaxed(
     hands: HandSets, start: LinearisationPoint, budget: Budget, most: int
 ) -> WristSolution:
     """Search for the least utilisation by relaxed programs, at rising prices."""
-    point, goal = start, LEAST_USE
-    for price in _prices(hands):
+    point, goal, prices = start, LEAST_USE, _prices(hands)
+    for price in prices:
         now, rounds = _descended(hands, goal, point, price, budget, most)
-        found, point = made_exact(hands, goal, now, rounds, budget), now.point
+        # after the last, a plan that uses more is better than none
+        growth = math.inf if price is prices[-1] else 1e-3
+        found, point = made_exact(hands, goal, now, rounds, budget, growth), now.point
         if found.exact or budget.ended or not now.sets.finite:
             break
         if _violation(now) > SETTINGS.far_off:

@@ -255,7 +255,12 @@ def repaired(hands: HandSets, goal: Goal, state: WristSolution, within: float) -
 
 
 def made_exact(
-    hands: HandSets, goal: Goal, start: WristSolution, rounds: int, budget: Budget
+    hands: HandSets,
+    goal: Goal,
+    start: WristSolution,
+    rounds: int,
+    budget: Budget,
+    growth: float = 1e-3,
 ) -> WristSolution:
     """Remove the violations at a point where a search ended without proof, by repeated corrections.
 
@@ -271,12 +276,14 @@ def made_exact(
         Number of linearisations until then.
     budget : Budget
         Largest number of conic programs.
+    growth : float, optional
+        How much corrections may add to the value, relative: a thousandth by default.
 
     Returns
     -------
     WristSolution
-        ``unproven`` with the corrected point if it is a plan whose value has hardly grown (by at
-        most a thousandth); else ``nothing``, with the point that the search ended at.
+        ``unproven`` with the corrected point if it is a plan whose value has not grown by more;
+        else ``nothing``, with the point that the search ended at.
     """
     now = start = searching(hands, goal, start.point, SETTINGS.first_range, error=start.error)
     for _ in range(12):
@@ -285,8 +292,7 @@ def made_exact(
         if goal.exact(now.measure, hands):
             outcome, value = goal.solve(now.sets.data), goal.value(start.measure)
             budget.spend()
-            # repairs may cost a thousandth
-            if outcome.solved and goal.value(now.measure) - value <= 1e-3 * max(1.0, value):
+            if outcome.solved and goal.value(now.measure) - value <= growth * max(1.0, value):
                 return replace(now, found="unproven", outcome=outcome, rounds=rounds)
             break
         before, now, rounds = now, repaired(hands, goal, now, SETTINGS.first_range), rounds + 1
