@@ -6,6 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -168,7 +169,7 @@ class _Finder:
             found = self._search(start, goal, within, at_least, 1.0)
         if higher:
             found = self._climb_higher(found, (start, goal), within, at_least)
-        return self._answer(found, within, at_least)
+        return self._answer(found, (start, goal), within, at_least)
 
     def _climb_higher(
         self, found: Found, ends: tuple[Ends, Ends], within: float, at_least: float | None
@@ -340,24 +341,22 @@ class _Finder:
         enough = at_least is not None and least >= at_least
         return enough or self._bound <= (1.0 + within) * least * (1.0 + slack)
 
-    def _answer(self, found: Found, within: float, at_least: float | None) -> FoundClimb:
+    def _answer(
+        self, found: Found, ends: tuple[Ends, Ends], within: float, at_least: float | None
+    ) -> FoundClimb:
         refused = tuple(
             RefusedMoves(limb=key[0], phase=key[1], reason=self._reasons[key], count=count)
             for key, count in self._refused.most_common()
         )
         wall, best = self._maker.wall, self._best
+        made = partial(
+            FoundClimb, wall=wall, ends=ends, found=found, bound=self._bound, refused=refused
+        )
         if best is None:
             ended = found.finished and not found.states
             proven = self._bound <= max(self._floor, at_least or 0.0)
             nothing: ClimbStatus = ("none" if proven else "blocked") if ended else "unknown"
-            return FoundClimb(
-                status=nothing,
-                wall=wall,
-                found=found,
-                bound=self._bound,
-                refused=refused,
-                seconds=dict(self._seconds),
-            )
+            return made(status=nothing, seconds=dict(self._seconds))
         status: ClimbStatus = "found" if self._good(within, at_least) else "not_proven"
         if at_least is not None and best.least < at_least:
             status = "none" if self._bound <= at_least else "unknown"
@@ -370,11 +369,8 @@ class _Finder:
             with suppress(DeadlineError):
                 changes = raises(wall, state, stage, deciding.load_factor)
         self._seconds["changes"] += time.perf_counter() - begun
-        return FoundClimb(
+        return made(
             status=status,
-            wall=wall,
-            found=found,
-            bound=self._bound,
             least=best.result.load_factor,
             route=with_joints(best.climb),
             climb=best.climb,
@@ -382,7 +378,6 @@ class _Finder:
             deciding=deciding,
             raises=tuple(change for change, _ in changes),
             raised=tuple(asked for _, asked in changes),
-            refused=refused,
             seconds=dict(self._seconds),
         )
 

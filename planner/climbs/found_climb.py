@@ -35,6 +35,8 @@ class FoundClimb:
     ----------
     status : {'found', 'not_proven', 'none', 'blocked', 'unknown'}
     wall : Wall
+    ends : tuple of Ends, length 2
+        Those of the start and of the goal.
     found : Found
         Answer of the search whose states the climb has; of the last search without a climb.
     bound : float
@@ -62,6 +64,7 @@ class FoundClimb:
 
     status: ClimbStatus
     wall: Wall
+    ends: tuple[Ends, Ends]
     found: Found
     bound: float
     least: float | None = None
@@ -86,13 +89,26 @@ class FoundClimb:
 
     @property
     def about(self) -> str:
-        """Sentence that says what the bound is about."""
+        """Sentence that says what the bound is about, and which limbs reach nothing at an end."""
         wall = self.wall
-        return (
+        said = (
             f"the bound is about the placements ({len(wall.places)}) and poses of the body "
             f"({len(wall.bodies)}), hands with fixed wrists and joints as the reach table has them "
             "(what inverse kinematics did not find is left out), without limits of joint torques"
         )
+        for name, end in zip(("start", "goal"), self.ends, strict=True):
+            if short := " and ".join(_out_of_reach(wall, end)):
+                said += f"; at the {name} no placement that counts is within reach of {short}"
+        return said
+
+
+def _out_of_reach(wall: Wall, end: Ends) -> list[str]:
+    """Return the limbs that reach no placement that counts, at any pose of the body at an end."""
+    reached = wall.reach.reached[:, end.bodies]
+    if end.members is not None:
+        at = np.array(end.members)
+        reached = reached[at, :, np.arange(len(at))].T[None]
+    return [limb for i, limb in enumerate(wall.robot.limbs) if not reached[:, :, i].any()]
 
 
 def with_joints(climb: Climb) -> Route:

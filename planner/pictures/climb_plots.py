@@ -62,6 +62,7 @@ def draw_climb(climb: Climb, result: RouteResult) -> Figure:
     def flat(points: Array) -> Array:
         return np.asarray(points @ plane)
 
+    bodies: list[Array] = []
     for axes, knot in zip(panels, shown, strict=True):
         assert knot.stage is not None  # as only these are shown
         answer, question = result.plans[knot.stage], result.stages[knot.stage].question
@@ -70,6 +71,7 @@ def draw_climb(climb: Climb, result: RouteResult) -> Figure:
         if isinstance(answer, Plan):
             scene = drawn_scene(replace(answer, joints=knot.joints), question)
             draw_scene(View(axes, flat, flat, np.cross(up, right), deep=False), scene, noted=False)
+            bodies += [each.vertices for each in scene.surfaces if each.kind in ("body", "link")]
             for artist in (*axes.lines, *axes.collections):
                 artist.set_clip_on(True)
         way = np.array([_hand(each, knot.limb) for each in _swing_to(climb, knot)])
@@ -77,9 +79,10 @@ def draw_climb(climb: Climb, result: RouteResult) -> Figure:
             axes.plot(*flat(way).T, ".-", color=COLOUR_OF["purple"], markersize=3, zorder=9)
     places = [hand.pose.position for knot in climb.knots for hand in knot.hands]
     places += [knot.body.position for knot in climb.knots]
-    extent = flat(np.array(places))
-    around = 0.3  # rock and elbows beyond the hands [m]
-    low, high = extent.min(axis=0) - around, extent.max(axis=0) + around
+    extent, whole = flat(np.array(places)), flat(np.vstack([*bodies, *places]))
+    around, edge = 0.3, 0.05  # rock beyond the hands, and air about the bodies [m]
+    low = np.minimum(extent.min(axis=0) - around, whole.min(axis=0) - edge)
+    high = np.maximum(extent.max(axis=0) + around, whole.max(axis=0) + edge)
     _set_frame(panels, low, high)
     _draw_margins(lower, climb)
     figure.colorbar(
@@ -234,11 +237,16 @@ def _draw_factors(axes: Any, found: FoundClimb) -> None:
             *here, "*", color=COLOUR_OF["red"], markersize=13, label=f"decides: {here[1]:.3f}"
         )
     if found.result is None:
-        said = {"none": "proven: there is no climb", "blocked": "no moves of a climb have a plan"}
-        axes.text(0.5, 0.5, said.get(found.status, "no climb was found in time"), ha="center")
+        said = {
+            "none": "proven: no climb holds enough",
+            "blocked": "no moves of a climb have a plan",
+        }
+        words = said.get(found.status, "no climb was found in time")
+        axes.text(0.5, 0.5, words, ha="center", transform=axes.transAxes)
     axes.axhline(1.0, color="0.6", linewidth=0.8)
     axes.xaxis.get_major_locator().set_params(integer=True)
     axes.set(xlabel="stage", ylabel="load factor [1]", title=found.status.replace("_", " "))
+    axes.margins(y=0.08)
     axes.set_ylim(bottom=0.0)
     axes.grid(alpha=0.3)
     if axes.get_legend_handles_labels()[1]:

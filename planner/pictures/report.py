@@ -309,7 +309,9 @@ def draw_route(result: RouteResult) -> Figure:
     lower.set(ylabel="load factor [1]", xlabel="stance")
     lower.set_ylim(0.0, 1.1 * float(np.nanmax([*factor, *bands[1][1], 1.0])))
     labels = [
-        "start" if s.move == 0 else f"{s.move} {s.phase}\n{str(s.limb).replace('_', ' ')}"
+        "start"
+        if s.move == 0
+        else f"{s.move} {s.phase}\n{(s.limb or '').replace('_', ' ')}".strip()
         for s in result.stages
     ]
     shown = slice(None, None, math.ceil(stage_width * len(index) / wide))

@@ -1,4 +1,9 @@
-from .asking import Sought as Sought, climb_end as climb_end, demo_request as demo_request
+from .asking import (
+    Sought as Sought,
+    climb_end as climb_end,
+    demo_request as demo_request,
+    part_of_whole as part_of_whole,
+)
 from .files import (
     write_route as write_route,
     write_search as write_search,

@@ -16,7 +16,7 @@ from planner import BodyGrid, PlaceGrid
 from service import requests, wire
 from service.climbs.rocks import rock_message
 
-__all__ = ["Sought", "climb_end", "demo_request"]
+__all__ = ["Sought", "climb_end", "demo_request", "part_of_whole"]
 
 
 class Sought(NamedTuple):
@@ -24,7 +24,7 @@ class Sought(NamedTuple):
 
     start: str
     goal: str
-    radius: float
+    radius: float | None
     best_within: str
     at_least: float | None
     time: float | None
@@ -52,6 +52,11 @@ class Sought(NamedTuple):
         InvalidInputError
             If an option is impossible, whatever the rock; of a grid, with its field.
         """
+        if self.radius is not None and not any("," in end for end in (self.start, self.goal)):
+            raise InvalidInputError(
+                "is the radius about a point x,y,z: give --from or --to as one, or leave it out",
+                field="--radius",
+            )
         places: dict[str, Any] = {} if self.spacing is None else {"spacing": self.spacing}
         bodies: dict[str, Any] = {}
         if self.body_spacing is not None:
@@ -72,7 +77,7 @@ class Sought(NamedTuple):
             surface=self.surface,
             places=place_grid,
             bodies=body_grid,
-            best_within=_part(self.best_within, "--best-within"),
+            best_within=part_of_whole(self.best_within, "--best-within"),
             at_least=self.at_least,
             time=self.time,
             refine=self.refine,
@@ -93,7 +98,7 @@ def demo_request() -> requests.ClimbRequest:
 def climb_end(
     text: str,
     field: str,
-    radius: float,
+    radius: float | None,
     read: Callable[[str], requests.PlanRequest],
 ) -> requests.ClimbEnd:
     """Return an end of a climb from ``x,y,z``, ``height:Z``, or a stance.
@@ -103,8 +108,8 @@ def climb_end(
     text : str
     field : str
         Option that has the text.
-    radius : float
-        Distance of the body from a point [m].
+    radius : float or None
+        Distance of the body from a point; 0.3 by default [m].
     read : callable
         Reads a stance of which the text is the name.
 
@@ -122,7 +127,8 @@ def climb_end(
             if len(numbers) != 3:
                 raise InvalidInputError(f"must be three numbers x,y,z, got {text!r}", field=field)
             x, y, z = numbers
-            return requests.ClimbEnd(near=(x, y, z), radius=radius)
+            end = requests.ClimbEnd(near=(x, y, z))
+            return end if radius is None else msgspec.structs.replace(end, radius=radius)
     except (ValueError, msgspec.ValidationError):
         raise InvalidInputError(
             f"must be x,y,z or height:Z in finite metres, or a stance, got {text!r}", field=field
@@ -144,8 +150,14 @@ def climb_end(
     return requests.ClimbEnd(body=stance.body, hands=hands)
 
 
-def _part(text: str, field: str) -> float:
+def part_of_whole(text: str, field: str) -> float:
     """Return a part of a whole from ``5%`` or ``0.05``.
+
+    Parameters
+    ----------
+    text : str
+    field : str
+        Option that has the text.
 
     Raises
     ------

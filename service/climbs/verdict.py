@@ -57,7 +57,7 @@ def verdict_sentences(
     raises : bool, optional
         Whether to say what raises the load factor of the stage that decides.
     """
-    asked = "" if at_least is None else f" with a load factor of {at_least:g}"
+    asked = f" with a load factor of {max(at_least or 1.0, 1.0):g} or more"
     yield {
         "found": "FOUND     a climb, planned from end to end",
         "not_proven": "FOUND     a climb, planned from end to end; another may be better",
@@ -93,4 +93,5 @@ def verdict_sentences(
     for kind in found.refused[:3]:
         which = kind.phase if kind.limb is None else f"{kind.phase} of {kind.limb}"
         yield f"{counted(kind.count, 'move')} had no plan ({which}): {kind.reason}"
-    yield found.about
+    if abs(found.bound) < float("inf"):
+        yield found.about

@@ -112,7 +112,7 @@ sought_options = options.asked_for(
     "sought",
     click.option("--from", "start", required=True, metavar="END", help=f"Start: {END_FORMS}."),
     click.option("--to", "goal", required=True, metavar="END", help=f"Goal: {END_FORMS}."),
-    _above("--radius", "Of the body's origin about x,y,z [m].", default=0.3, show_default=True),
+    _above("--radius", "Of the body's origin about x,y,z [m]; 0.3 by default."),
     click.option(
         "--best-within",
         default="5%",

@@ -11,7 +11,7 @@ from click.core import ParameterSource
 
 import planner
 from hand_models.base import InvalidInputError
-from service import answering, replies, requests, tables
+from service import answering, climbs, replies, requests, tables
 from service.commands import options, stances
 
 if TYPE_CHECKING:
@@ -223,16 +223,13 @@ def body_space_command(
 )
 @click.option(
     "--within",
-    type=options.FiniteRange(0.0, 1.0, max_open=True),
-    default=0.0,
+    default="0",
     metavar="PART",
-    help="Plan also all whose load factor may be within this part of the best, as 0.05.",
+    help="Plan also all whose load factor may be within this part of the best, as 5% or 0.05.",
 )
 @options.own_options
 @options.json_option
-def screen_command(
-    candidates: str, best: int, within: float, own: options.Own, as_json: bool
-) -> int:
+def screen_command(candidates: str, best: int, within: str, own: options.Own, as_json: bool) -> int:
     """Rank stances by their load factors; solve only those that may be the best.
 
     CANDIDATES is the path of a file of JSON lines as crux batch takes it, - for standard input, or
@@ -242,6 +239,7 @@ def screen_command(
 
     Exit status: 0 if a stance has a load factor, 3 if none has, 2 if none can be read.
     """
+    part = climbs.part_of_whole(within, "--within")
     names, questions, wrong = [], [], dict[str, str]()
     first: InvalidInputError | None = None
     for name, request in stances.read_candidates(candidates):
@@ -255,7 +253,7 @@ def screen_command(
     if first is not None and not names:
         raise InvalidInputError(f"{next(iter(wrong))}: {first.message}", field=first.field)
     with tables.working(f"screening {len(names)} stances"):
-        found = planner.screen(questions, best=best, within=within)
+        found = planner.screen(questions, best=best, within=part)
     wrong |= {names[i]: fault for i, fault in found.faults.items()}
     if as_json:
         tables.say(tables.screening_json(found, names, wrong))

@@ -102,6 +102,21 @@ def test_detours_are_states_of_the_wall_one_after_the_other():
     assert least == sorted(least, reverse=True)
 
 
+def test_limbs_that_reach_nothing_at_an_end_are_named():
+    wall = knob_wall()
+    limb, entry = wall.robot.limbs[2], wall.reach.entry.copy()
+    entry[:, 7, 2] = -1
+    short = replace(wall, reach=replace(wall.reach, entry=entry))
+    start, goal = ends(short, [1], START), ends(short, [7])
+    found = find_climb(short, start, goal)
+    assert found.status == "none"
+    assert found.about.endswith(f"at the goal no placement that counts is within reach of {limb}")
+    entry[4, 1, 2] = -1
+    found = replace(found, ends=(start, ends(short, [1])))
+    assert found.about.count(f"within reach of {limb}") == 1
+    assert "at the start no placement" in found.about
+
+
 @pytest.mark.slow
 def test_a_climb_is_found_and_every_knot_of_it_is_verified():
     wall = knob_wall()

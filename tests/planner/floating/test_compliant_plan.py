@@ -328,7 +328,7 @@ def test_a_plan_that_uses_more_is_better_than_none() -> None:
     found = plan(replace(complying(random_question(24)), want=frozenset()))
     assert found.verified
     assert found.utilisation is not None
-    # no less than the sets about that point allow, by a program of another kind
+    # the sets linearised about that point allow 1.5625
     assert 1.56 < found.utilisation < 1.6
 
 

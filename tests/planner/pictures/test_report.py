@@ -51,7 +51,8 @@ def test_the_name_of_the_crux_is_inside_the_frame_and_beside_the_legend(used, cr
 
 def test_a_bar_that_is_cut_off_is_seen_to_be_broken_and_a_missing_load_factor_is_told():
     question, plan = answered()
-    stages = [RouteStage(i, i, "lift", "front_left", question) for i in range(4)]
+    stages = [RouteStage(i, i, "lift", "front_left", question) for i in range(3)]
+    stages.append(RouteStage(3, 3, "shift", None, question))
     plans = [
         replace(plan, utilisation=0.5, load_factor=2.0),
         replace(plan, utilisation=7.5, load_factor=None),
@@ -64,6 +65,11 @@ def test_a_bar_that_is_cut_off_is_seen_to_be_broken_and_a_missing_load_factor_is
     (broken,) = (line for line in upper.lines if line.get_color() == "white")
     assert (min(broken.get_xdata()), max(broken.get_xdata())) == (0.5, 1.5)
     assert max(broken.get_ydata()) < upper.patches[1].get_height() < upper.get_ylim()[1]
+    assert [text.get_text() for text in lower.get_xticklabels()][1:] == [
+        "1 lift\nfront left",
+        "2 lift\nfront left",
+        "3 shift",
+    ]
     assert [(text.get_text(), text.get_position()[0]) for text in lower.texts] == [
         ("none", 1),
         ("unbounded", 2),

@@ -102,6 +102,13 @@ def test_a_stance_that_cannot_be_read_is_named_by_its_option(tmp_path):
             sought(goal=text)
 
 
+def test_a_radius_without_a_point_is_refused():
+    assert sought(radius=None).start.radius == ClimbEnd(near=(0.0, 0.0, 0.0)).radius
+    with pytest.raises(InvalidInputError, match="x,y,z") as caught:
+        sought(start="height:0.8")
+    assert caught.value.field == "--radius"
+
+
 @pytest.mark.parametrize("text", ["-1%", "nan", "1001%", "five", ""])
 def test_a_part_that_is_none_is_refused(text):
     with pytest.raises(InvalidInputError, match="--best-within"):
