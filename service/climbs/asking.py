@@ -54,7 +54,7 @@ class Sought(NamedTuple):
         """
         if self.radius is not None and not any("," in end for end in (self.start, self.goal)):
             raise InvalidInputError(
-                "is the radius about a point x,y,z: give --from or --to as one, or leave it out",
+                "is about a point x,y,z: give --from or --to as one, or leave it out",
                 field="--radius",
             )
         places: dict[str, Any] = {} if self.spacing is None else {"spacing": self.spacing}

@@ -16,7 +16,7 @@ __all__ = ["Interrupted", "interruptible", "kill_children"]
 
 ENDING_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
-IMPORTING: Final = "_frozen_importlib"
+IMPORT_MODULE: Final = "_frozen_importlib"
 """Name of the module whose functions import modules."""
 
 
@@ -54,14 +54,14 @@ def interruptible() -> Iterator[None]:
 def _interrupt(number: int, frame: FrameType | None) -> None:
     """Answer the first signal: let the command end by itself, but not for ever."""
     above = set(_modules_above(frame))
-    if "numba" in above and IMPORTING not in above:
+    if "numba" in above and IMPORT_MODULE not in above:
         # a compiled function that takes its arguments goes on whatever is raised there, and what
         # comes of that is an error of another kind: the signal comes again
         threading.Timer(0.01, os.kill, (os.getpid(), number)).start()  # [s]
         return
     for each in ENDING_SIGNALS:
         signal.signal(each, _end)
-    if IMPORTING in above:
+    if IMPORT_MODULE in above:
         # extension modules turn what is raised into errors of their own, or print it
         _end()
     # [s] to keep what is done, and to end
