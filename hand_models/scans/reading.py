@@ -254,7 +254,7 @@ def _check_digits(points: Array, scale: float, path: Path) -> None:
                 f"coordinates up to {largest:,.0f} have {digits} digits, steps of {step:g} "
                 f"{_of_unit(scale)}, and {len(points):,} points are at {distinct:,} places: "
                 "write more digits, or subtract an offset before the export, and then give "
-                f"--view: {path}",
+                f"--view; or give --unit, if that is not the unit: {path}",
                 field="file",
             )
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from msgspec import Meta, field
 
-from hand_models.base import InvalidFieldError, Strict, errors_under
+from hand_models.base import InvalidFieldError, Strict
 from hand_models.hand import Grasp
 
 if TYPE_CHECKING:
@@ -104,8 +104,10 @@ class PlaceGrid(Strict, frozen=True):
         _check(self, {"angles": (1, 360), "kept": (1, 360)}, "")
         _check_several(self, "rotations")
         for rotation in self.rotations:
-            with errors_under("rotations"):
+            try:
                 Grasp(outer_rotation=rotation)
+            except InvalidFieldError as error:
+                raise InvalidFieldError(error.message, field="rotations") from None
 
 
 class BodyGrid(Strict, frozen=True):
