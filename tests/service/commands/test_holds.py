@@ -253,7 +253,7 @@ def test_places_at_holes_of_a_scan_are_counted_with_what_may_close_them(tmp_path
     for name, some in (("whole", faces), ("holed", faces[~hole])):
         scan, output = tmp_path / f"{name}.ply", tmp_path / f"{name}.json"
         trimesh.Trimesh(vertices, some, process=False).export(scan)
-        grid = ["--spacing", "0.06", "--angles", "2", "--outer-rotation", "0"]
+        grid = ["--spacing", "0.1", "--angles", "1", "--outer-rotation", "0"]
         options = ["-o", str(output), *grid, "--robust", "0", "--workers", "1"]
         assert run_command_line(["holds", str(scan), *options]) == DONE
         reasons = json.loads(output.read_text(encoding="utf-8"))["reasons"]
