@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -45,7 +47,7 @@ def compiled(*arguments: Argument) -> Callable[[Function], Function]:
     types = [_type(each) for each in arguments]
 
     def decorated(function: Function) -> Function:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), _no_garbage_collected():
             # that functions are handed over is called experimental, since 2020
             warnings.simplefilter("ignore", numba.NumbaExperimentalFeatureWarning)
             return _made(function)
@@ -59,6 +61,18 @@ def compiled(*arguments: Argument) -> Callable[[Function], Function]:
         return cast("Function", made)
 
     return decorated
+
+
+@contextmanager
+def _no_garbage_collected() -> Iterator[None]:
+    """Look for no garbage meanwhile: numba makes millions of objects, and needs most of them."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
 
 
 def has_compiled(module: str) -> bool:
