@@ -286,7 +286,9 @@ class View:
             inside = (moved[:, :2] >= frame.min).all(axis=1) & (moved[:, 2:] <= frame.max).all(
                 axis=1
             )
-            under = (dots[None] > moved[:, None, :2]) & (dots[None] < moved[:, None, 2:])
+            near = (dots > moved[:, :2].min(axis=0)) & (dots < moved[:, 2:].max(axis=0))
+            near = dots[near.all(axis=1)]
+            under = (near > moved[:, None, :2]) & (near < moved[:, None, 2:])
             # in steps: a covered dot, leaving the frame, and lying on another note
             costs = np.hypot(*moves.T) + 0.6 * under.all(axis=2).sum(axis=1)
             best = int(np.argmin(costs + 1e3 * (2.0 * ~free + ~inside)))
