@@ -10,7 +10,6 @@ from functools import cache
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from msgspec import UNSET, structs
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
@@ -231,6 +230,7 @@ def test_under_several_accelerations_it_is_a_solid_that_plans_confirm():
         assert not all(held(middle + (reach + 0.005 * width) * way))
 
 
+@cache
 def shaken(by: float) -> tuple[ComRegion, ComSolid | None]:
     """Region of ``wall-300``, and its solid under shaking [m/s²]."""
     return region_of("wall-300"), com_solid(
@@ -292,7 +292,7 @@ def test_no_label_lies_on_the_centre_of_mass_and_axes_have_their_names(shift):
     hand = space.question.stance.hands[0].pose.position
     beside = replace(region, com=hand + shift * region.axes[1])
     figure = draw_com_region(space, beside, "slab")
-    FigureCanvasAgg(figure).draw()
+    figure.draw_without_rendering()
     (axes,) = figure.axes
     at = axes.transData.transform(region.axes @ beside.com)
     boxes = [label.get_window_extent() for label in axes.texts]

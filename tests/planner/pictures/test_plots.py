@@ -11,7 +11,6 @@ from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import proj3d
@@ -361,8 +360,10 @@ def test_what_is_drawn_of_a_finger_and_the_palm_is_in_the_legend():
 
 def test_a_plans_spread_is_drawn_where_it_was_asked_for():
     def titles(*want: str) -> list[str]:
-        asked = ask(on_wall(), *want)
-        answer = solve.plan(asked)
+        asked, answer = answered("spread")
+        if "spread" not in want:
+            asked = ask(asked.stance, *want)
+            answer = solve.plan(asked)
         axes = draw_plan(answer, asked).axes
         for each in axes:
             if each.get_xlabel() == "load factor [1]":
@@ -391,10 +392,9 @@ def test_a_plans_spread_is_drawn_where_it_was_asked_for():
 
 
 def test_the_heading_of_a_spread_with_a_cap_lies_on_no_label():
-    asked = ask(on_wall(), "spread", "load_factor")
-    answer = solve.plan(asked)
+    asked, answer = answered("spread")
     figure = draw_plan(replace(answer, spread=structs.replace(answer.spread, cap=0.8)), asked)
-    FigureCanvasAgg(figure).draw()
+    figure.draw_without_rendering()
     (heading,) = (axes._left_title for axes in figure.axes if "feasible" in axes.get_title("left"))
     assert heading.get_text().endswith("(utilisation up to 0.8)")
     box = heading.get_window_extent()
@@ -403,13 +403,12 @@ def test_the_heading_of_a_spread_with_a_cap_lies_on_no_label():
 
 
 def test_numbers_and_legends_of_a_spread_lie_on_nothing_else():
-    asked = ask(on_wall(), "spread", "load_factor")
-    answer = solve.plan(asked)
+    asked, answer = answered("spread")
     spread = answer.spread
     for holds, without in ((1, 28), (0, 0), (1, spread.draws - 2), (14, 2), (spread.draws - 1, 1)):
         kept = structs.replace(spread.kept, holds=holds, without=without)
         figure = draw_plan(replace(answer, spread=structs.replace(spread, kept=kept)), asked)
-        FigureCanvasAgg(figure).draw()
+        figure.draw_without_rendering()
         small = [
             axes for axes in figure.axes if "samples" in (axes.get_xlabel(), axes.get_ylabel())
         ]

@@ -110,7 +110,7 @@ def test_the_oldest_files_go_where_there_is_a_limit(tmp_path, monkeypatch):
     monkeypatch.setattr(
         module, "RECORDER_SETTINGS", module.RECORDER_SETTINGS._replace(flush=0.0, chunk=1000)
     )
-    path, limit = tmp_path / "a.mcap", 200_000
+    path, limit = tmp_path / "a.mcap", 50_000
     recorder = Recorder(path, "robosimian", limit=limit)
     made = 0
     while not (tmp_path / "a-12.mcap").exists():
@@ -142,7 +142,7 @@ import resource, sys, pathlib
 from service.recording import Recorder, Recording, recorder
 from tests.service.recording.test_recorder import exchange
 from tests.suite.helpers.patience import soon
-recorder.RECORDER_SETTINGS = recorder.RECORDER_SETTINGS._replace(flush=0.0, rest=3.0)
+recorder.RECORDER_SETTINGS = recorder.RECORDER_SETTINGS._replace(flush=0.0, rest=0.5)
 path = pathlib.Path(sys.argv[1])
 # as a disk that is full: no file grows beyond this
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))

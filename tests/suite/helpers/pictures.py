@@ -18,7 +18,7 @@ from service.answering import questions
 from service.commands.stances import read_request
 from tests.suite.helpers.hands import ROCK
 from tests.suite.helpers.robots import TWO_LINK, arm, limbs_toml
-from tests.suite.helpers.stances import attainable_wrench, on_wall, wall
+from tests.suite.helpers.stances import ask, attainable_wrench, on_wall, wall
 
 __all__ = ["answered", "drawn", "panels"]
 
@@ -34,7 +34,6 @@ def answered(name):
     two = replace(on_wall(off=OFF, limbs=("front_left", "rear_right")), joints="solve")
     bare = on_wall(off=OFF, limbs=("front_left", "front_right"), palm=False, lateral=False)
     bare = replace(bare, joints="solve")
-    own = standing("left", "right")
     floating = on_wall(off=OFF)
     floating = replace(
         floating, hands=(replace(floating.hands[0], wrist="floating"), *floating.hands[1:])
@@ -51,8 +50,10 @@ def answered(name):
         "nails": lambda: requested("ledge"),
         "one limb": lambda: Question(standing("leg")),
         "two limbs": lambda: Question(
-            own, body_wrench=attainable_wrench(own, np.random.default_rng(0))
+            own := standing("left", "right"),
+            body_wrench=attainable_wrench(own, np.random.default_rng(0)),
         ),
+        "spread": lambda: ask(on_wall(), "spread", "load_factor"),
     }
     question = questions[name]()
     return question, solve.plan(question)
