@@ -37,12 +37,15 @@ atexit.register(lambda: print("\\n" + json.dumps(list(sys.modules))))
 
 def test_a_name_of_an_index_is_had_without_the_libraries_behind_others() -> None:
     for statement, absent in [
-        ("from service import CruxClient", (*HEAVY, "numpy", "rich")),
-        ("from service import PlanRequest, ServiceError", (*HEAVY, "numpy", "zenoh")),
-        ("from hand_models import Pose, Cylinder", HEAVY),
+        ("from service import CruxClient", (*HEAVY, "numpy", "rich", "planner.solving")),
+        (
+            "from service import PlanRequest, ServiceError",
+            (*HEAVY, "numpy", "zenoh", "planner.solving"),
+        ),
+        ("from hand_models import Pose, Cylinder", (*HEAVY, "hand_models.hand")),
         (
             "from planner import Load, Limits",
-            ("scipy.optimize", "trimesh", "numba", "cvxpy", "clarabel"),
+            ("scipy.optimize", "trimesh", "numba", "cvxpy", "clarabel", "planner.solving"),
         ),
         ("from planner import plan", ("scipy.sparse", "trimesh", "numba", "cvxpy", "matplotlib")),
     ]:

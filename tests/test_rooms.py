@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -63,7 +64,10 @@ def test_what_an_index_exports_is_what_the_module_defines_and_no_module_hides_it
 def test_nothing_is_found_by_an_objects_identity():
     for package in PACKAGES:
         for path in (ROOT / package).rglob("*.py"):
-            for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            text = path.read_text("utf-8")
+            if not re.search(r"\bid\s*\(|KeyDictionary|ValueDictionary", text):
+                continue
+            for node in ast.walk(ast.parse(text)):
                 asked = isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
                 assert not (asked and node.func.id == "id"), f"{path}:{node.lineno}"
                 weak = isinstance(node, ast.Name) and node.id.endswith(
@@ -78,20 +82,6 @@ def test_every_room_has_an_index():
     assert {path for path in found if path.name not in others} | {
         ROOT / "hand_models" / "parameters"
     } == set(ROOMS)
-
-
-def test_importing_a_name_does_not_load_the_house():
-    for statement, absent in [
-        ("from hand_models import Pose", ("scipy", "trimesh", "hand_models.hand", "matplotlib")),
-        ("from planner import Load, Limits", ("cvxpy", "clarabel", "planner.solving")),
-        ("from service import PlanRequest", ("numpy", "zenoh", "planner.solving")),
-        ("from service import CruxClient", ("cvxpy", "pinocchio", "planner.solving")),
-    ]:
-        code = f"import sys; {statement}; print([n for n in {absent!r} if n in sys.modules])"
-        done = subprocess.run(
-            [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
-        )
-        assert done.stdout.strip() == "[]"
 
 
 def test_threads_may_be_the_first_to_import():

@@ -164,7 +164,7 @@ def test_what_is_answered_is_kept(tmp_path, capfd, monkeypatch):
 
 @watched
 def test_a_sweep_ends_with_its_processes(tmp_path):
-    varied = ["--vary", "load.mass=60:120:100", "--vary", "body.position.0=-1:0:100"]
+    varied = ["--vary", "load.mass=60:120:100", "--vary", "body.position.0=-1:0:20"]
     process = begun("sweep", "wall-300", *varied, "-o", str(tmp_path), "--workers", "2")
     until(lambda: workers(process), process)
     process.send_signal(signal.SIGINT)
