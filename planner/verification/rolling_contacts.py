@@ -145,7 +145,7 @@ class RestingContact(NamedTuple):
         -------
         slip : float or None
             Slip along the rock [m]; None where the rock near the contact is neither a circle nor a
-            line.
+            line, or the contact goes on from one to the other.
         off : float
             Distance along the phalanx from the reported contact to the recomputed one [m].
         """
@@ -154,21 +154,26 @@ class RestingContact(NamedTuple):
             return None, 0.0
         off = along - face.along
         if self.bears is None:
-            return off - self._arc(point, way, face.way if face.lies else None), off
+            arc = self._arc(point, way, face.way if face.lies else None)
+            return None if arc is None else off - arc, off
         touches = along + _beside(self.section, radius, point, way)
         touches = min(max(touches, face.near), face.far)
         went = face.bears(touches, radius) - self.bears
         arc = self._arc(point + (touches - along) * way, way, face.way)
-        return touches - self.touches - arc, off - went
+        return None if arc is None else touches - self.touches - arc, off - went
 
-    def _arc(self, after: complex, u: complex, lies: complex | None) -> float:
+    def _arc(self, after: complex, u: complex, lies: complex | None) -> float | None:
         """Return how far the contact went along the rock, positive away from the base [m].
 
-        From the chord and the turn of the rock's normal, as on a circle. ``lies``: along a face
-        that touches at rest, which on a flat is the rock's own way but for the search's tolerance.
+        From the chord and the turn of the rock's normal, as on a circle; None if that is no chord
+        of a circle. ``lies``: along a face that touches at rest, which on a flat is the rock's own
+        way but for the search's tolerance.
         """
         first, last = self.normal, _normal(self.section, after)
         turn, middle = cmath.phase(last * first.conjugate()), first + last
+        if abs(turn) > 1e-3 and abs(_dot(after - self.point, middle / abs(middle))) > 1e-8:
+            # [rad, m] where an edge's fillet ends, for one
+            return None
         tangent = 1j * middle / abs(middle)
         straight = 1e-12  # [rad] turn of the normal of flat rock
         if lies is not None and abs(turn) < straight:

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.solving import KnownStance
+from planner.solving import KnownStance, plan
 from planner.solving.verified import prepare_checks
 from service.answering import questions
 from service.commands.stances import read_request
-from tests.suite.helpers.stances import complying
+from tests.suite.helpers.stances import complying, random_question
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +40,12 @@ def of_first_wrist(arrays, **changed):
 
 def test_the_plan_itself_passes(known):
     assert problems(known) == []
+
+
+def test_a_contact_that_goes_from_a_fillet_to_a_face_has_no_slip_of_a_circle():
+    """Two tiles of a hand on an edge do; by a circle they would slip 0.2 μm less, and hold 1 mN."""
+    found = plan(complying(random_question(55)))
+    assert found.verified, found.reason
 
 
 def test_a_tension_or_a_load_that_is_off_is_refused(known):
