@@ -6,6 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -134,12 +135,11 @@ class _Finder:
         progress: Callable[[ClimbProgress], None] | None,
     ) -> None:
         self._maker, self._settings, self._progress = maker, settings, progress
-        self._asks = False
-        self._memory = SearchMemory()
+        self._asks, self._memory = False, SearchMemory()
         self._refused = Counter[tuple[str | None, KnotPhase]]()
         self._reasons = dict[tuple[str | None, KnotPhase], str]()
         self._best: _Planned | None = None
-        self._bound = np.inf
+        self._bound, self._proof = np.inf, Found.nothing().proof
         # below one, the hands do not hold the robot at all
         self._floor = 1.0
         self._begun = time.perf_counter()
@@ -223,7 +223,8 @@ class _Finder:
             )
         except DeadlineError:
             found = Found.nothing()
-        self._bound = min(self._bound, found.bound)
+        if found.bound <= self._bound:
+            self._bound, self._proof = found.bound, found.proof
         self._seconds["search"] += time.perf_counter() - begun
         return found
 
@@ -348,6 +349,8 @@ class _Finder:
             RefusedMoves(limb=key[0], phase=key[1], reason=self._reasons[key], count=count)
             for key, count in self._refused.most_common()
         )
+        # the bound may be that of another search, and the certificate is one of this bound
+        found = replace(found, bound=self._bound, proof=self._proof)
         wall, best = self._maker.wall, self._best
         made = partial(
             FoundClimb, wall=wall, ends=ends, found=found, bound=self._bound, refused=refused
@@ -386,8 +389,7 @@ class _Finder:
     ) -> None:
         if self._progress is not None:
             best = None if self._best is None else self._best.result.load_factor
-            bounds = [each for each in (bound, self._bound) if each is not None]
-            lowest = min(bounds)
+            lowest = min(each for each in (bound, self._bound) if each is not None)
             seconds = time.perf_counter() - self._begun
             known = lowest if np.isfinite(lowest) else None
             self._progress(ClimbProgress(phase, best, known, seconds, done, total))

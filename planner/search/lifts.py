@@ -92,7 +92,7 @@ class Ground:
                     turned = table.moments[body, limb, own] @ table.directions[:, 3:].T
                     needed += np.minimum(turned.min(axis=0), 0.0)
             counts = needed > SEARCH_SETTINGS.exact
-            found[body] = np.min(held[counts] / needed[counts], initial=1e9)
+            found[body] = np.min(held[counts] / needed[counts], initial=SEARCH_SETTINGS.unbounded)
         return found * (1.0 + 1e3 * SEARCH_SETTINGS.exact)
 
 

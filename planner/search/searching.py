@@ -250,6 +250,7 @@ class _Search:
         self._table = learnt(self._table, self._programs, lifts, half, self._check)
         bounds = self._table.bounds(lifts)
         self._bound = self._ceiling = float(np.max(self._ground.tops(self._table), initial=0.0))
+        self._prove_top()
         self._tried = float(np.max(bounds, initial=0.0))
         if len(bounds):
             some = lifts.of(np.arange(min(len(bounds), settings.examples)))
@@ -336,6 +337,18 @@ class _Search:
             own=known.directions[bounding],
             backward=decided.exhausted == 2,
         )
+
+    def _prove_top(self) -> None:
+        """Take the directions learnt as the proof of the first bound, which rule out all states."""
+        if 0.0 < self._bound < SEARCH_SETTINGS.unbounded:
+            limbs = self._ground.reached.shape[2]
+            self._proof = Proof(
+                multiple=self._bound,
+                directions=self._table.directions,
+                members=np.zeros((0, limbs), dtype=np.intp),
+                own=np.zeros((0, 6)),
+                backward=False,
+            )
 
     def _answer(self, finished: bool) -> Found:
         """Return what was found, each state's program solved again by another solver."""

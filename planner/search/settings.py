@@ -52,6 +52,8 @@ class SearchSettings:
     exact: float = 1e-9
     """Part by which a climb has to be better than one that is known, and relative tolerance of the
     compiled programs' load factors."""
+    unbounded: float = 1e9
+    """Load factor that stands for one without a bound."""
     zero: float = 1e-11
     """What counts as zero in the compiled simplex method [1]: wrenches are in `WRENCH_UNIT`."""
     pivots: int = 2000

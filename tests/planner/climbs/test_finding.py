@@ -9,10 +9,11 @@ import pytest
 
 from hand_models.base import CruxError, InvalidInputError, Pose
 from planner import DeadlineError, Load, Question, Stance, evaluate, find_climb, plan, plan_climb
+from planner.certification import check_bound
 from planner.climbs import ClimbStep, MoveChecks, RouteMaker, detours, refuse_limits
 from planner.climbs.finding import _Finder
 from planner.question import ForceCap, Limits
-from planner.search import Found, State, search
+from planner.search import Found, State, climb_certificate, search
 from tests.suite.helpers.climbs import climbed
 from tests.suite.helpers.knob_walls import best_climb, ends, factor, knob_wall, neighbours
 
@@ -239,6 +240,25 @@ def test_it_is_proven_that_no_climb_has_a_load_factor_that_hands_do_not_hold():
     found = find_climb(wall, ends(wall, [1], START), ends(wall, [1], GOAL), at_least=3.0)
     assert (found.status, found.climb, found.least) == ("none", None, None)
     assert found.bound <= 3.0
+
+
+def test_the_certificate_is_one_of_the_bound_that_is_stated(monkeypatch):
+    wall, bounds = knob_wall(), []
+    low, high = ends(wall, [1], START), ends(wall, [1], GOAL)
+
+    def forgetful(*given, **named):
+        """Search; the last of several searches knows no bound, as if time were over."""
+        known = search(*given, **named)
+        bounds.append(known.bound)
+        return known if len(bounds) == 1 else replace(known, bound=np.inf, proof=None)
+
+    monkeypatch.setattr("planner.climbs.finding.search", forgetful)
+    found = find_climb(wall, low, high, within=1.0)
+    assert len(bounds) == 2
+    assert found.bound == found.found.bound == bounds[0]
+    certificate = climb_certificate(wall, low, high, found.found)
+    assert certificate.multiple == found.bound
+    assert check_bound(certificate).proven
 
 
 def test_a_start_that_is_a_goal_is_a_climb_without_moves():

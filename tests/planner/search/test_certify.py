@@ -8,6 +8,7 @@ import pytest
 from hand_models.base import InvalidInputError
 from planner.certification import check_bound, check_route
 from planner.search import climb_certificate, search
+from planner.search.searching import _Search, _TimeOverError
 from tests.suite.helpers.certificates import (
     best_climb,
     every_state,
@@ -62,6 +63,33 @@ def test_that_there_is_no_climb_is_accepted():
     stronger = climb.base + np.array([0.0, 0.0, 2.0, 0.0, 0.0, 0.0])
     wider = {"base": stronger, "reached": np.ones_like(climb.reached)}
     assert not check_bound(replace(found, **wider)).proven
+
+
+def broken_off_at(monkeypatch, wall, start, goal, phase):
+    """Search until a phase begins, as if time were over then."""
+    with monkeypatch.context() as patch:
+        report = _Search._report
+
+        def late(self, said):
+            if said.startswith(phase):
+                raise _TimeOverError
+            report(self, said)
+
+        patch.setattr(_Search, "_report", late)
+        return search(wall, start, goal)
+
+
+def test_the_bound_of_a_search_that_has_decided_nothing_yet_is_accepted(monkeypatch):
+    climb = random_climb(34, placements=5, bodies=3, reach=0.6)
+    wall, start, goal = wall_of(climb)
+    found = broken_off_at(monkeypatch, wall, start, goal, "lifts")
+    certificate = climb_certificate(wall, start, goal, found)
+    assert found.states == ()
+    assert best_of(climb)[0] < found.bound < np.inf
+    assert certificate.multiple == found.bound
+    assert check_bound(certificate).proven
+    # all three hands together hold so much in no direction
+    assert not check_bound(replace(certificate, multiple=0.1 * found.bound)).proven
 
 
 def test_a_search_without_a_proof_has_none():
