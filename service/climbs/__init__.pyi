@@ -9,6 +9,7 @@ from .files import (
     write_search as write_search,
     write_stance as write_stance,
 )
+from .folders import ClimbFolder as ClimbFolder
 from .listing import (
     Listing as Listing,
     climb_listing as climb_listing,

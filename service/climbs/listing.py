@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+import os
 from collections.abc import Callable, Generator, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from hand_models.base import InvalidInputError
 from service import bulk, tables, wire
 from service.climbs.naming import with_options
 
@@ -45,6 +47,21 @@ class Listing(NamedTuple):
     columns: tuple[bulk.Column, ...]
     printed: tuple[tables.PrintedColumn, ...]
     answers: Callable[[Answers], Answers]
+
+    def refuse(self, file: Path, names: Sequence[str]) -> None:
+        """Refuse a file for the results that is one of the names, or cannot be gone on with.
+
+        Raises
+        ------
+        InvalidInputError
+            If it is so.
+        """
+        if any(os.path.abspath(name) == os.path.abspath(file) for name in names):
+            said = f"{file} is one of the {self.noun} and would be overwritten; name another file"
+            raise InvalidInputError(said, field="-o")
+        if file.suffix.lower() == ".jsonl" and file.exists() and not file.is_file():
+            said = f"{file}: must be a file, not a device or pipe; name another"
+            raise InvalidInputError(said, field="-o")
 
     def print(self, file: Path, names: Sequence[str], before: int, elapsed: float) -> None:
         """Print each result, and the file of the results.

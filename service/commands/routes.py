@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -197,7 +196,8 @@ def climb_command(
         return _many(listing, sources, output, resume, parallel, own, as_json)
     with climbs.naming_options():
         asked = own.asked(asking(Path(rocks[0])))
-        return search_climb(asked, output, parallel, own, as_json, page, wanted)
+        inputs = {"ROCK": rocks[0], "--from": sought.start, "--to": sought.goal}
+        return search_climb(asked, output, parallel, own, as_json, page, wanted, inputs)
 
 
 def search_climb(
@@ -208,13 +208,18 @@ def search_climb(
     as_json: bool,
     page: Path | None = None,
     wanted: options.Wanted | None = None,
+    inputs: Mapping[str, str] | None = None,
 ) -> int:
-    """Search for a climb, write its files, and print the verdict; return the exit status."""
+    """Search for a climb, write its files, and print the verdict; return the exit status.
+
+    Files that are inputs, or not of an earlier climb in the folder, are not replaced or removed.
+    """
     tables.fill_alone(folder)
+    filled = climbs.ClimbFolder(folder, inputs or {})
     # a wall takes as long as some thousand plans
     on, workers = parallel.place(1000)
     found = climbs.seek(request, own.robots, on, workers, folder)
-    with tables.filling_folder():
+    with tables.filling_folder(), filled.filling():
         files = climbs.write_search(request, found, folder)
         if found.found.result is not None:
             asked = _Asked.of([str(files["route"])], options.Wanted(unexplained=True), own)
@@ -362,14 +367,9 @@ def _many(
     unexplained: bool = True,
 ) -> int:
     """Answer any number of routes or climbs, and keep their results."""
-    if any(os.path.abspath(name) == os.path.abspath(file) for name in sources.names):
-        said = f"{file} is one of the {listing.noun} and would be overwritten; name another file"
-        raise InvalidInputError(said, field="-o")
+    listing.refuse(file, sources.names)
     tables.write_alone(file)
     begun = perf_counter()
-    if file.suffix.lower() == ".jsonl" and file.exists() and not file.is_file():
-        said = f"{file}: must be a file, not a device or pipe; name another"
-        raise InvalidInputError(said, field="-o")
     sink = batch.new_run(
         file, sources, lambda: listing.columns, own, explained=not unexplained, resume=resume
     )
