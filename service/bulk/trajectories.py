@@ -152,7 +152,8 @@ def read_climb(folder: Path) -> tuple[list[KnotReply], ClimbSummary]:
     ------
     InvalidInputError
         If a file is missing or cannot be read, the trajectory is cut off, of another climb, or
-        edited: its knots have been verified as they were written.
+        edited: its knots have been verified as they were written; or if it lies beside a search
+        that found no climb.
     """
     knots, about = read_trajectory(folder), read_climb_summary(folder)
     again, count = f"write both again with: {_command(folder)}", knots[-1].index + 1
@@ -166,6 +167,13 @@ def read_climb(folder: Path) -> tuple[list[KnotReply], ClimbSummary]:
         raise InvalidInputError(
             f"{folder}: the trajectory, or its rates in summary.json, are not those that were "
             f"planned (climb.digest differs): edited knots are not verified; {again}",
+            field="DIR",
+        )
+    searched = all((folder / name).exists() for name in ("wall.npz", "wall.png"))
+    if searched and not (folder / "route.json").exists():
+        raise InvalidInputError(
+            f"{folder}: has a search for a climb (wall.png) that found no route.json, and the "
+            "trajectory of another climb; write that one to a folder of its own",
             field="DIR",
         )
     return knots, about

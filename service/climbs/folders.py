@@ -1,4 +1,4 @@
-"""Keep files of others in the folder of a climb.
+"""Keep files of others in the folder of a climb, and let all files of an earlier climb go together.
 
 A folder has a record of the files that its climb has written. What is not in the record, or is not
 as it was written, is never replaced or removed.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 
@@ -89,13 +89,19 @@ class ClimbFolder:
 
     @contextmanager
     def filling(self) -> Iterator[None]:
-        """Record the files that are written within this context.
+        """Remove the files of an earlier climb, and record those that are written, as a context.
 
         Raises
         ------
         OSError
-            If the record cannot be written.
+            If a file cannot be removed or written.
         """
+        for name in [*self._existing()]:
+            if name != RECORD_NAME and self._is_own(name):
+                (self._folder / name).unlink(missing_ok=True)
+        with suppress(OSError):
+            # other files may be there
+            (self._folder / STAGES_NAME).rmdir()
         begun = dict.fromkeys((*SEARCH_NAMES, *ROUTE_NAMES, f"{STAGES_NAME}/"))
         self._write(begun)
         yield

@@ -1,7 +1,8 @@
-"""Folders of climbs: no file of somebody else is replaced or removed."""
+"""Folders of climbs: no file of somebody else is replaced or removed, and no old one stays."""
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -9,9 +10,10 @@ import pytest
 from hand_models.base import InvalidInputError
 from hand_models.rock import Mesh
 from hand_models.scans import generate_wall, write_rock
+from service.bulk import read_climb
 from service.climbs import ClimbFolder
 from service.commands.cli import run_command_line
-from tests.suite.helpers.commands import BAD_INPUT, DONE, complaint
+from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED, complaint
 
 TINY = ["--from", "height:0.8", "--to", "height:0.8", "--stand-off", "0.6"]
 TINY += ["--spacing", "0.3", "--body-spacing", "0.3", "--workers", "1"]
@@ -133,4 +135,34 @@ def test_a_climb_that_was_broken_off_while_it_was_written_is_written_again(tmp_p
 
     with pytest.raises(KeyboardInterrupt):
         broken_off()
-    ClimbFolder(tmp_path, {})
+    with ClimbFolder(tmp_path, {}).filling():
+        pass
+    assert set(contents(tmp_path)) == {"crux-climb.json"}
+
+
+def test_all_files_of_an_earlier_climb_go_with_it(climbed, tmp_path, capfd):
+    folder = tmp_path / "out"
+    shutil.copytree(climbed, folder)
+    (folder / "stages" / "own.json").write_text("{}")
+    before = set(contents(folder))
+    given = ["climb", "small-wall:2", *TINY, "--at-least", "9", "-o", str(folder)]
+    assert run_command_line(given) == OVERLOADED
+    assert "NONE" in capfd.readouterr().out
+    left = {"wall.npz", "wall.png", "certificate.npz", "crux-climb.json", "stages/own.json"}
+    kept = {name for name in before if name.endswith(".chunks")}
+    assert set(contents(folder)) == left | kept
+    assert before > left | kept
+    assert run_command_line(["play", str(folder)]) == BAD_INPUT
+    assert "trajectory.jsonl: No such file" in complaint(capfd)
+
+
+def test_a_trajectory_beside_a_search_that_found_no_climb_is_not_played(climbed, tmp_path, capfd):
+    folder = tmp_path / "out"
+    shutil.copytree(climbed, folder)
+    knots, _ = read_climb(folder)
+    assert knots
+    for name in ("rock.ply", "route.json", "crux-climb.json"):
+        (folder / name).unlink()
+    assert run_command_line(["play", str(folder)]) == BAD_INPUT
+    said = complaint(capfd)
+    assert f"{folder}: has a search for a climb (wall.png) that found no route.json" in said
