@@ -1,3 +1,4 @@
+from .asked_replies import AskedReplies as AskedReplies
 from .chunks import (
     Setting as Setting,
     answer_chunk as answer_chunk,

@@ -29,11 +29,11 @@ from service.bulk.tally import Tally
 from service.replies import ErrorDetail
 from service.wire import Format, identifier
 
-__all__ = ["ReplyLines", "Run", "TableLines"]
+__all__ = ["AnswerOutcome", "ReplyLines", "Run", "TableLines"]
 
 
-class _Outcome(NamedTuple):
-    """Outcome of an answer for the tally; the time is in s."""
+class AnswerOutcome(NamedTuple):
+    """AnswerOutcome of an answer for the tally; the time is in s."""
 
     status: str | None
     error: ErrorDetail | None
@@ -125,11 +125,11 @@ class Run(ABC):
             self.tally.add(*outcome)
 
     @abstractmethod
-    def _line(self, question: bytes, payload: bytes, seconds: float) -> tuple[bytes, _Outcome]:
+    def _line(self, question: bytes, payload: bytes, seconds: float) -> tuple[bytes, AnswerOutcome]:
         """Return the line of an answer, and what is to be counted."""
 
     @abstractmethod
-    def _read_line(self, line: bytes, question: bytes, where: str) -> _Outcome:
+    def _read_line(self, line: bytes, question: bytes, where: str) -> AnswerOutcome:
         """Return what is to be counted of a line, if it is an answer to a question."""
 
     def _read(self, file: Path, asked: Asked) -> int:
@@ -192,9 +192,9 @@ class _Reply(msgspec.Struct):
     error: ErrorDetail | None = None
 
     @property
-    def outcome(self) -> _Outcome:
+    def outcome(self) -> AnswerOutcome:
         seconds = None if self.time is None else self.time.total
-        return _Outcome(self.status, self.error, seconds)
+        return AnswerOutcome(self.status, self.error, seconds)
 
 
 class ReplyLines(Run):
@@ -216,7 +216,7 @@ class ReplyLines(Run):
         super().__init__(file, resume, asked)
         self._shown = shown and file is None
 
-    def _line(self, question: bytes, payload: bytes, seconds: float) -> tuple[bytes, _Outcome]:
+    def _line(self, question: bytes, payload: bytes, seconds: float) -> tuple[bytes, AnswerOutcome]:
         reply = msgspec.json.decode(payload, type=_Reply)
         line = payload + b"\n"
         if self._shown:
@@ -224,7 +224,7 @@ class ReplyLines(Run):
             sys.stdout.buffer.flush()
         return line, reply.outcome
 
-    def _read_line(self, line: bytes, question: bytes, where: str) -> _Outcome:
+    def _read_line(self, line: bytes, question: bytes, where: str) -> AnswerOutcome:
         try:
             reply = msgspec.json.decode(line, type=_Reply)
         except (msgspec.DecodeError, UnicodeDecodeError):
@@ -364,12 +364,12 @@ class TableLines(Run):
             for line in islice(lines, 1, 1 + self.tally.count):
                 yield msgspec.json.decode(line, type=_RowLine)
 
-    def _line(self, question: bytes, payload: bytes, seconds: float) -> tuple[bytes, _Outcome]:
+    def _line(self, question: bytes, payload: bytes, seconds: float) -> tuple[bytes, AnswerOutcome]:
         row = self.row(payload)
         line = _RowLine(row.values, row.status, row.error, asked=_digest(question))
-        return msgspec.json.encode(line) + b"\n", _Outcome(row.status, row.error, seconds)
+        return msgspec.json.encode(line) + b"\n", AnswerOutcome(row.status, row.error, seconds)
 
-    def _read_line(self, line: bytes, question: bytes, where: str) -> _Outcome:
+    def _read_line(self, line: bytes, question: bytes, where: str) -> AnswerOutcome:
         try:
             row = msgspec.json.decode(line, type=_RowLine)
             whole = len(row.values) + self._numbered == len(self._described)
@@ -383,11 +383,11 @@ class TableLines(Run):
             )
         if row.asked != _digest(question):
             raise InvalidInputError(
-                f"{where}: the rows answer other requests than those given now; is the file of "
-                "another batch?",
+                f"{where}: the rows answer other requests than those given now; give these again, "
+                "as they were, or start again without --resume",
                 field="--resume",
             )
-        return _Outcome(row.status, row.error)
+        return AnswerOutcome(row.status, row.error)
 
 
 def _digest(question: bytes) -> str:

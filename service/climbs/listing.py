@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from hand_models.base import InvalidInputError
+from hand_models.parameters import ParameterTable
+from planner import RobotFile
 from service import bulk, tables, wire
-from service.climbs.naming import with_options
+from service.climbs.naming import FIELD_OPTIONS, with_options
 
 __all__ = ["Listing", "climb_listing", "route_listing"]
 
@@ -38,6 +40,8 @@ class Listing(NamedTuple):
         Of the table that is printed, without the last one, their names.
     answers : callable
         Takes the answers, and returns them as they are kept.
+    options : mapping of str to str
+        Options of the fields of a request.
     """
 
     kind: str
@@ -47,6 +51,7 @@ class Listing(NamedTuple):
     columns: tuple[bulk.Column, ...]
     printed: tuple[tables.PrintedColumn, ...]
     answers: Callable[[Answers], Answers]
+    options: Mapping[str, str]
 
     def refuse(self, file: Path, names: Sequence[str]) -> None:
         """Refuse a file for the results that is one of the names, or cannot be gone on with.
@@ -62,6 +67,36 @@ class Listing(NamedTuple):
         if file.suffix.lower() == ".jsonl" and file.exists() and not file.is_file():
             said = f"{file}: must be a file, not a device or pipe; name another"
             raise InvalidInputError(said, field="-o")
+
+    def run(
+        self,
+        file: Path,
+        asked: bulk.Asked,
+        hand: ParameterTable | None,
+        robot: RobotFile | None,
+        *,
+        explained: bool,
+        resume: bool,
+    ) -> bulk.Run:
+        """Return the run that stores the answers: rows of a table, or lines of replies.
+
+        Parameters
+        ----------
+        file : Path
+            Of the results.
+        asked : Asked
+            All questions.
+        hand, robot : ParameterTable, RobotFile or None
+            The caller's own.
+        explained : bool
+            Whether the plans are explained by certificates.
+        resume : bool
+            True to keep answers that the file already has.
+        """
+        header = bulk.new_header(self.columns, explained, hand, robot)
+        if bulk.exporter_at(file) is None:
+            return bulk.AskedReplies(file, header, resume, asked, self.options)
+        return bulk.TableLines(file, self.columns, header, resume, asked)
 
     def print(self, file: Path, names: Sequence[str], before: int, elapsed: float) -> None:
         """Print each result, and the file of the results.
@@ -119,7 +154,9 @@ def route_listing() -> Listing:
         tables.number("load factor", "load_factor", _decimal),
     )
     kind, columns = wire.ServiceName.ROUTE, tuple(bulk.route_columns())
-    return Listing(kind, "routes", "planning routes", 50, columns, printed, lambda answers: answers)
+    return Listing(
+        kind, "routes", "planning routes", 50, columns, printed, lambda answers: answers, {}
+    )
 
 
 def climb_listing() -> Listing:
@@ -133,7 +170,9 @@ def climb_listing() -> Listing:
         tables.number("knots"),
     )
     kind, columns = wire.ServiceName.CLIMB, tuple(bulk.climb_columns())
-    return Listing(kind, "rocks", "searching rocks", 1000, columns, printed, with_options)
+    return Listing(
+        kind, "rocks", "searching rocks", 1000, columns, printed, with_options, FIELD_OPTIONS
+    )
 
 
 def _status() -> tables.PrintedColumn:

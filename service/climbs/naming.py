@@ -4,12 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator
 from contextlib import closing, contextmanager
+from typing import Final
 
 from hand_models.base import CruxError
 from service.replies import ErrorDetail, ErrorReply
 from service.wire import Answer, Format
 
-__all__ = ["naming_options", "with_options"]
+__all__ = ["FIELD_OPTIONS", "naming_options", "with_options"]
+
+FIELD_OPTIONS: Final = {
+    "rock": "ROCK (or --lean)",
+    "start": "--from (or --radius)",
+    "goal": "--to (or --radius)",
+    "places": "--spacing",
+    "bodies": "--body-spacing (or --stand-off)",
+    "surface": "--surface",
+    "best_within": "--best-within",
+    "at_least": "--at-least",
+    "time": "--time",
+    "refine": "--refine",
+    "wrist": "--wrist",
+    "wrist_travel": "--wrist-travel",
+    "hand": "--hand",
+    "robot": "--robot",
+}
+"""Options of ``crux climb`` by the fields of a request that are made of them."""
 
 
 @contextmanager

@@ -370,9 +370,8 @@ def _many(
     listing.refuse(file, sources.names)
     tables.write_alone(file)
     begun = perf_counter()
-    sink = batch.new_run(
-        file, sources, lambda: listing.columns, own, explained=not unexplained, resume=resume
-    )
+    with batch.writing_answers(file):
+        sink = listing.run(file, sources, *own, explained=not unexplained, resume=resume)
     before = sink.tally.count
     left = max(1, sources.count - before)
     on, workers = parallel.place(listing.plans * left)

@@ -13,7 +13,7 @@ from hand_models.scans import generate_wall
 from planner import ClimbCertificate, check_bound, robosimian
 from service.bulk import read_trajectory
 from service.commands.cli import run_command_line
-from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED
+from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED, complaint
 
 ENDS = ("--from", "height:0.75", "--to", "height:1.1")
 TINY = ["--from", "height:0.8", "--to", "height:0.8", "--stand-off", "0.6"]
@@ -168,6 +168,70 @@ def test_what_is_impossible_of_all_rocks_is_refused_at_once(
     assert run_command_line(["climb", *TINY, *given]) == BAD_INPUT
     assert said in capsys.readouterr().err
     assert not any(tmp_path.iterdir())
+
+
+def flipped_rock(file: Path, width: int = 1) -> str:
+    """Write rock that faces the other way, of which each search ends at once with an error."""
+    points = f"0 0 0\n0 {width} 0\n1 0 0\n1 {width} 0\n"
+    file.write_text(f"OFF\n4 2 0\n{points}3 0 2 1\n3 1 2 3\n")
+    return str(file)
+
+
+@pytest.mark.parametrize("ending", [".jsonl", ".csv"])
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        (["--at-least", "1.9"], "--at-least"),
+        (["--from", "height:0.7", "--refine", "2"], "--from (or --radius) and --refine"),
+        (["--lean", "0.1"], "ROCK (or --lean)"),
+        ([], "ROCK (or --lean)"),
+    ],
+)
+def test_other_options_or_another_rock_are_no_run_to_go_on_with(
+    changes, named, ending, tmp_path, capfd
+):
+    rock, file = tmp_path / "flipped.off", tmp_path / f"climbs{ending}"
+    first = [flipped_rock(rock), *TINY, "--at-least", "1.2", "--workers", "1"]
+    asked = ["climb", *first, "-o", str(file)]
+    assert run_command_line(asked) == BAD_INPUT
+    # the same is answered
+    assert run_command_line([*asked, "--resume"]) == BAD_INPUT
+    assert "1 were answered before" in capfd.readouterr().out
+    before = file.read_bytes()
+    if not changes:
+        flipped_rock(rock, 2)
+    assert run_command_line([*asked, *changes, "--resume"]) == BAD_INPUT
+    said = complaint(capfd)
+    assert "or start again without --resume" in said
+    if ending == ".jsonl":
+        assert f"{file}, line 1: answers {str(rock)!r} with another {named}; give that" in said
+    assert file.read_bytes() == before
+
+
+def test_what_could_be_read_once_has_to_be_read_again_and_an_error_stays(tmp_path, capfd):
+    rock, file = tmp_path / "flipped.off", tmp_path / "climbs.jsonl"
+    asked = ["climb", str(tmp_path / "none.off"), flipped_rock(rock), *TINY, "-o", str(file)]
+    assert run_command_line(asked) == BAD_INPUT
+    flipped_rock(tmp_path / "none.off")
+    assert run_command_line([*asked, "--resume"]) == BAD_INPUT
+    assert "2 were answered before" in capfd.readouterr().out
+    rock.unlink()
+    assert run_command_line([*asked, "--resume"]) == BAD_INPUT
+    said = complaint(capfd)
+    assert f"line 2: answers {str(rock)!r} with another content" in said
+    assert "which cannot be read now" in said
+
+
+def test_lines_that_do_not_say_what_was_asked_are_not_gone_on_with(tmp_path, capfd):
+    file = tmp_path / "climbs.jsonl"
+    asked = ["climb", flipped_rock(tmp_path / "flipped.off"), *TINY, "-o", str(file)]
+    assert run_command_line(asked) == BAD_INPUT
+    (line,) = lines(file)
+    assert line.pop("asked").keys() >= {"rock", "start", "goal", "places", "crux", "robot_file"}
+    file.write_text(json.dumps(line, separators=(",", ":")) + "\n")
+    capfd.readouterr()
+    assert run_command_line([*asked, "--resume"]) == BAD_INPUT
+    assert "line 1: does not say what was asked" in complaint(capfd)
 
 
 @pytest.mark.slow
