@@ -98,18 +98,18 @@ class Mesh(OutlinedHold):
 
     @property
     def border(self) -> Array:
-        return self._border[1]
+        return self._borders[0]
 
-    @cached_property
+    @property
     def outline(self) -> Array:
-        pairs, border = self._border
-        return border[~around_holes(self.triangles, pairs)]
+        return self._borders[1]
 
     @cached_property
-    def _border(self) -> tuple[Indices, Array]:
-        """Edges of the border as pairs of vertices, and their end points [m]."""
+    def _borders(self) -> tuple[Array, Array]:
+        """End points of the edges of the border, and of those of the outline [m]."""
         pairs = border_pairs(self.triangles, self._scale.bridged_gap)
-        return pairs, np.asarray(self.triangles.vertices[pairs])
+        border = np.asarray(self.triangles.vertices[pairs])
+        return border, border[~around_holes(self.triangles, pairs)]
 
     @cached_property
     def oddities(self) -> tuple[str, ...]:

@@ -20,12 +20,10 @@ import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from importlib import import_module
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from hand_models.base import BASE_TOLERANCES, Array, Indices, InvalidInputError
@@ -154,14 +152,12 @@ def smooth(points: Array, scale: Scale) -> Array | None:
     return smoothed(points, lengths, step, count, rest, closed, wide, narrow)
 
 
-@lru_cache(maxsize=64)
 def _weights(part: int) -> Array:
     """Return the weights of 2 part + 1 points with which a parabola is fitted at each of them."""
-    # as `scipy.signal.savgol_coeffs` has them, whose room takes longer to load than all rock
-    places = np.arange(2 * part + 1.0)
-    powers = np.arange(min(2, 2 * part) + 1.0)[:, None]
-    first = (powers[:, 0] == 0.0).astype(float)
-    return np.array([scipy.linalg.lstsq((places - i) ** powers, first)[0] for i in places])
+    # as `scipy.signal.savgol_coeffs` has them: projections on 1, x and x², made orthogonal
+    x = np.arange(-part, part + 1.0)
+    bases = np.stack([np.ones_like(x), x, x * x - part * (part + 1.0) / 3.0])[: 2 * part + 1]
+    return np.asarray((bases.T / (bases * bases).sum(axis=1)) @ bases)
 
 
 def _reached(pieces: Sequence[Array], scale: Scale) -> list[Array]:
