@@ -25,7 +25,7 @@ from planner.prepare import HandBatch, Posture
 from planner.question import HandOnHold, LostTile, Question, Stance
 from planner.result import PlanArrays
 from planner.verification.fingers import DriveLimits, NailLimits, TwistLimits
-from planner.verification.floating import recompute_floating
+from planner.verification.floating import floating_fingers, recompute_floating
 from planner.verification.hands import HandLimits, check_contacts
 from planner.verification.joint_balance import JointBalance
 from planner.verification.limbs import AskedLimits, JointUse, check_limbs, recompute_joints
@@ -92,9 +92,15 @@ class SettledLimits:
             for h, place in enumerate(places)
             if place.wrist == "floating"
         }
-        giving = [h for h, place in enumerate(places) if place.wrist != "fixed"]
+        giving = {
+            h: place.wrist == "compliant"
+            for h, place in enumerate(places)
+            if place.wrist != "fixed"
+        }
+        self._giving = list(giving)
+        self._floating = floating_fingers(known.hands, giving) if giving else None
         whole = None if before is None else before._balance
-        self._balance = balance = JointBalance(names, giving, whole)
+        self._balance = balance = JointBalance(names, self._giving, whole)
         self.nails = nails = NailLimits(names)
         if before is None:
             drives = DriveLimits(names, balance.left, strength, nails.fingers)
@@ -117,7 +123,9 @@ class SettledLimits:
         """
         balance, f, lateral = self._balance, arrays.tensions, arrays.loads[:, 2]
         nails = self.nails.recompute(arrays)
-        if not any(arrays.wrists):
+        rest = self._floating
+        # wrists of other hands than the question's are refused by `Check`
+        if rest is None or [h for h, each in enumerate(arrays.wrists) if each] != self._giving:
             loads, left = balance.loads(f, lateral)
             return Recomputed(arrays, loads, left, f, loads[:, 0], nails)
         # motors of hands that float stand still where they have tightened their tendons, those of
@@ -125,7 +133,7 @@ class SettledLimits:
         wound = f.copy()
         for h, tension in self.wound.items():
             wound[FINGER_COUNT * h : FINGER_COUNT * (h + 1)] = tension
-        shear, normal, left = recompute_floating(found, self.names, balance, arrays, wound)
+        shear, normal, left = recompute_floating(found, self.names, balance, rest, arrays, wound)
         loads, (drawn, _) = np.column_stack((shear, normal, lateral)), balance.loads(wound, lateral)
         return Recomputed(arrays, loads, left, wound, drawn[:, 0], nails)
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from functools import lru_cache
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +28,7 @@ from planner.verification.joint_balance import Fingers, JointBalance
 from planner.verification.residuals import FINGER_COUNT, TOLERANCES, PartNames, allowed_errors
 from planner.verification.rolling_contacts import RestingContact, finger_contacts
 
-__all__ = ["recompute_floating"]
+__all__ = ["FloatingFingers", "floating_fingers", "recompute_floating"]
 
 
 def moved(places: Array, twists: Array) -> Array:
@@ -49,7 +49,12 @@ def moved(places: Array, twists: Array) -> Array:
 
 
 def recompute_floating(
-    found: list[str], names: PartNames, balance: JointBalance, arrays: PlanArrays, wound: Array
+    found: list[str],
+    names: PartNames,
+    balance: JointBalance,
+    rest: FloatingFingers,
+    arrays: PlanArrays,
+    wound: Array,
 ) -> tuple[Array, Array, Array]:
     """Recompute the tile loads of floating or compliant hands, and check their postures.
 
@@ -61,6 +66,8 @@ def recompute_floating(
         Names of the hands' parts.
     balance : JointBalance
         Balance of the fingers' joints.
+    rest : FloatingFingers
+        Fingers of the floating and compliant hands.
     arrays : PlanArrays
         The plan's numbers.
     wound : ndarray, shape (F,)
@@ -75,7 +82,6 @@ def recompute_floating(
     """
     known = names.known
     fingers = Fingers(*(part.copy() for part in balance.fingers(wound)))
-    rest = _resting(known.hands, tuple([wrist and wrist.driven for wrist in arrays.wrists]))
     allowed, hands = allowed_errors(known, arrays), rest.which[::FINGER_COUNT] // FINGER_COUNT
     wrong, exact = _move(rest, arrays, wound, fingers, allowed)
     for k, h in enumerate(hands.tolist()):
@@ -94,7 +100,7 @@ def recompute_floating(
 
 
 def _move(
-    rest: _RestingFingers, arrays: PlanArrays, wound: Array, fingers: Fingers, allowed: Array
+    rest: FloatingFingers, arrays: PlanArrays, wound: Array, fingers: Fingers, allowed: Array
 ) -> tuple[dict[int, list[str]], Flags]:
     """Move fingers with their wrists, and check what a plan says of them but for their normals.
 
@@ -112,9 +118,8 @@ def _move(
     base = (steps[:, :2] @ rest.planes)[..., 0]
     ways, points = -(arrays.axes[tiles, 0] @ rest.planes)[..., 0], (places @ rest.planes)[..., 0]
     dragged = ways * rest.tilts
-    joints = np.column_stack((base[:, 0], rest.model.joint_spacing * dragged[:, :-1])).cumsum(
-        axis=1
-    )
+    bones = np.column_stack((base[:, 0], rest.model.joint_spacing * dragged[:, :-1]))
+    joints = bones.cumsum(axis=1)
     fingers.joints[which] = np.stack((joints.real, joints.imag), axis=2)
     arms, beside = (points - joints) * ways.conj(), (places @ rest.across)[..., 0]
     misplaced = ~(np.abs((arms.imag - rest.heights, beside - rest.besides)) <= 1e-9)  # [m] rounding
@@ -157,7 +162,7 @@ def _move(
 
 
 def _slips(
-    rest: _RestingFingers,
+    rest: FloatingFingers,
     wrong: dict[int, list[str]],
     points: Complexes,
     along: Array,
@@ -178,7 +183,7 @@ def _slips(
     return slips, exact
 
 
-class _RestingFingers(NamedTuple):
+class FloatingFingers(NamedTuple):
     """The k fingers of settled hands whose wrists give, at rest: what does not change as they do.
 
     Fingers have up to n tiles; what is of fewer is padded at its end.
@@ -242,11 +247,10 @@ class _RestingFingers(NamedTuple):
     tiles_of: tuple[slice, ...]
 
 
-@lru_cache(maxsize=64)  # as many stances as `SETTLED_LIMITS` keeps
-def _resting(hands: tuple[SettledHand, ...], driven: tuple[bool | None, ...]) -> _RestingFingers:
-    """Return the fingers of settled hands, of which some have driven wrists (None: fixed)."""
+def floating_fingers(hands: tuple[SettledHand, ...], driven: Mapping[int, bool]) -> FloatingFingers:
+    """Return the fingers of the hands that are ``driven`` or not, by index; true if compliant."""
     starts = np.cumsum([0, *(len(hand.finger_of) for hand in hands)]).tolist()
-    giving = [h for h, drives in enumerate(driven) if drives is not None]
+    giving = list(driven)
     each = [(hands[h], i) for h in giving for i in range(FINGER_COUNT)]
     frames = [hand.hand.frames(hand.grasp.outer_rotation)[i] for hand, i in each]
     owns = [np.flatnonzero(hand.finger_of == i) for hand, i in each]
@@ -269,7 +273,7 @@ def _resting(hands: tuple[SettledHand, ...], driven: tuple[bool | None, ...]) ->
     tilts = np.array([[contact.tilt for contact in of_finger] for of_finger in settled])
     springs = np.array(model.joint_stiffness) * np.diff(angles, prepend=0.0, axis=1)
     losses = np.array([hand.hand.finger.friction for hand, _ in each])
-    return _RestingFingers(
+    return FloatingFingers(
         which=np.concatenate([FINGER_COUNT * h + np.arange(FINGER_COUNT) for h in giving]),
         rows=rows,
         own=np.arange(n) < counts,
@@ -282,7 +286,7 @@ def _resting(hands: tuple[SettledHand, ...], driven: tuple[bool | None, ...]) ->
         angles=angles,
         tilts=np.exp(-1j * tilts),
         contacts=contacts,
-        tendons=TendonBatch(tendons, [bool(driven[h]) for h in giving for _ in FINGERS]),
+        tendons=TendonBatch(tendons, [driven[h] for h in giving for _ in FINGERS]),
         stiffness=pad_tiles([tendon.contact_stiffness for tendon in tendons], 0.0),
         losses=(1.0 - losses[:, None]) ** np.arange(n),
         resists=resists,
@@ -309,11 +313,8 @@ def _tendon(hand: SettledHand, own: Indices) -> FingerTendon:
 
 def _contact_stiffness(hand: SettledHand, own: Indices, known: FingerTendon) -> Array:
     """Return the contact stiffness of a finger's tiles, by their spines on rock, shape (n,)."""
-    springs, strands, of_each = (
-        known.spring_stiffness,
-        known.pulley_ratio,
-        hand.hand.finger.shear_gain,
-    )
+    springs, strands = known.spring_stiffness, known.pulley_ratio
+    of_each = hand.hand.finger.shear_gain
     gains = np.array((*of_each[: len(own) - len(PHALANGES)], *of_each))
     whole = hand.stiffness_ratio * springs * gains / (strands - gains)
     # a tile whose spines alone gave as these and its spring do would have φ g of shear per newton
@@ -322,7 +323,7 @@ def _contact_stiffness(hand: SettledHand, own: Indices, known: FingerTendon) -> 
 
 
 def _check_stretches(
-    wrong: dict[int, list[str]], rest: _RestingFingers, arrays: PlanArrays
+    wrong: dict[int, list[str]], rest: FloatingFingers, arrays: PlanArrays
 ) -> None:
     """Check how far a plan stretches the fingers' tiles, by the shears that it returns."""
     said = np.full(len(arrays.loads), np.nan)
@@ -386,11 +387,10 @@ def _check_palm(
         return rising**2 / (2.0 * onset) + whole
 
     shear = stiffness * pressed(-float(step[0]), 1e-4)
+    gaps = np.array(hand.palm.gaps)[list(hand.palm.engaged)]
     pressing = sum(
         share * body.palm_pressing_stiffness * pressed(float(step[2]) - max(gap, 0.0), 2e-5)
-        for share, gap in zip(
-            hand.palm.engagement, np.array(hand.palm.gaps)[list(hand.palm.engaged)], strict=True
-        )
+        for share, gap in zip(hand.palm.engagement, gaps, strict=True)
     )
     off = np.abs(force - np.array([-shear, 0.0, pressing])).max()
     if not off <= allowed:

@@ -7,6 +7,7 @@ import pytest
 
 from planner.solving import KnownStance, plan
 from planner.solving.verified import prepare_checks
+from planner.verification import Check
 from service.answering import questions
 from service.commands.stances import read_request
 from tests.suite.helpers.stances import complying, random_question
@@ -88,5 +89,15 @@ def test_stretches_that_are_off_or_missing_are_refused(known):
 
 
 def test_a_motor_that_would_stand_still_holds_other_loads(known):
-    found = problems(known, wrists=of_first_wrist(known[1], driven=False))
+    check, arrays, rest = known
+    first, *others = check.question.stance.hands
+    still = (replace(first, wrist="floating", tendon_preload=arrays.tensions[:4]), *others)
+    asked = replace(check.question, stance=replace(check.question.stance, hands=still))
+    wrists = of_first_wrist(arrays, driven=False)
+    found = Check(asked, check.known, None).problems(arrays._replace(wrists=wrists), *rest)
     assert any("does not hold" in text or "carries" in text for text in found)
+
+
+def test_a_wrist_of_another_kind_is_refused(known):
+    found = problems(known, wrists=of_first_wrist(known[1], driven=False))
+    assert any("the wrist is not compliant" in text for text in found)
