@@ -8,12 +8,11 @@ what cannot be said is left out; `service.wire.schema` has the whole schema of e
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any, Final
 
 import msgspec
 
-from service.wire import schema, service_key
+from service.wire import service_key
 
 __all__ = ["QUESTIONS_TOPIC", "QuestionRecord", "channel_schema", "topic_of"]
 
@@ -61,25 +60,21 @@ def topic_of(key: str, kind: str) -> str:
     return f"/{service_key(robot, name)}/{kind}"
 
 
-def channel_schema(kind: str) -> bytes:
+def channel_schema(kind: str, definitions: dict[str, Any]) -> bytes:
     """Return the plain JSON Schema of a kind of message, encoded.
 
     Parameters
     ----------
     kind : str
         Name of the message's type.
+    definitions : dict
+        Schemas of the types of all messages, by name: ``$defs`` of `service.wire.schema`.
     """
     if kind == QuestionRecord.__name__:
         (root,), parts = msgspec.json.schema_components([QuestionRecord])
     else:
-        root, parts = {"$ref": f"#/$defs/{kind}"}, _definitions()
+        root, parts = {"$ref": f"#/$defs/{kind}"}, definitions
     return msgspec.json.encode(_plain(root, parts) or {"type": "object", "properties": {}})
-
-
-@cache
-def _definitions() -> dict[str, Any]:
-    found: dict[str, Any] = schema()["$defs"]
-    return found
 
 
 def _plain(part: dict[str, Any], parts: dict[str, Any]) -> dict[str, Any] | None:

@@ -21,7 +21,7 @@ from service.recording.channels import QUESTIONS_TOPIC, QuestionRecord, channel_
 from service.recording.files import RecordingFile
 from service.replies import RecordingHealth
 from service.requests import CancelRequest, WrenchRequest
-from service.wire import Answer, Format, ServiceName, service_key
+from service.wire import Answer, Format, ServiceName, schema, service_key
 
 __all__ = ["RECORDER_SETTINGS", "Exchange", "Recorder", "RosSample"]
 
@@ -174,6 +174,7 @@ class Recorder:
     # the thread ----------------------------------------------------------------------------------
 
     def _run(self) -> None:
+        self._definitions: dict[str, Any] = schema()["$defs"]
         flush_at: float | None = None
         ended = False
         while not ended:
@@ -291,12 +292,12 @@ class Recorder:
             if text is None:
                 lost = item.request
             else:
-                _add(file, item.key, _request_kind(item.key), text, arrived, number)
+                self._message(file, item.key, _request_kind(item.key), text, arrived, number)
         if item.answer is not None:
             kind = item.answer.encoding.partition(";crux.")[2].partition("@")[0]
             own = item.answer.encoding.startswith(Format.JSON.value)
             text = item.answer.payload if own else _as_json(*item.answer[:2])
-            _add(file, item.key, kind, text or b"null", at, number)
+            self._message(file, item.key, kind, text or b"null", at, number)
         if item.request is not None:
             about = QuestionRecord(
                 number=number,
@@ -309,22 +310,22 @@ class Recorder:
                 payload=lost,
             )
             kind, key = QuestionRecord.__name__, service_key(self._robot, QUESTIONS_TOPIC)
-            schema = partial(_schema, kind, kind)
-            file.add(f"/{key}/{kind}", schema, msgspec.json.encode(about), at, number)
+            described = partial(self._schema, kind, kind)
+            file.add(f"/{key}/{kind}", described, msgspec.json.encode(about), at, number)
         self._added()
 
     def _added(self) -> None:
         self._count, self._unsafe = self._count + 1, self._unsafe + 1
 
+    def _message(
+        self, file: RecordingFile, key: str, kind: str, text: bytes, at: int, number: int
+    ) -> None:
+        described = partial(self._schema, f"crux.{kind}", kind)
+        file.add(topic_of(key, kind), described, text, at, number)
 
-def _add(file: RecordingFile, key: str, kind: str, text: bytes, at: int, number: int) -> None:
-    schema = partial(_schema, f"crux.{kind}", kind)
-    file.add(topic_of(key, kind), schema, text, at, number)
-
-
-def _schema(name: str, kind: str) -> tuple[str, str, bytes]:
-    """Return the schema of a channel of one kind of message: name, encoding, and the schema."""
-    return name, "jsonschema", channel_schema(kind)
+    def _schema(self, name: str, kind: str) -> tuple[str, str, bytes]:
+        """Return the schema of a channel of one kind of message: name, encoding, and the schema."""
+        return name, "jsonschema", channel_schema(kind, self._definitions)
 
 
 def _request_kind(key: str) -> str:

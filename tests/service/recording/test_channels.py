@@ -8,8 +8,9 @@ import msgspec
 import pytest
 
 from service.recording.channels import QuestionRecord, channel_schema, topic_of
-from service.wire.json_schema import MESSAGE_KINDS
+from service.wire.json_schema import MESSAGE_KINDS, schema
 
+DEFINITIONS = schema()["$defs"]
 SCALARS = {"boolean", "integer", "number", "string"}
 
 
@@ -30,14 +31,14 @@ def check_plain(schema: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("kind", [*MESSAGE_KINDS, QuestionRecord], ids=lambda kind: kind.__name__)
 def test_the_schema_of_a_channel_is_plain(kind):
-    schema = msgspec.json.decode(channel_schema(kind.__name__))
-    check_plain(schema)
+    described = msgspec.json.decode(channel_schema(kind.__name__, DEFINITIONS))
+    check_plain(described)
     names = {field.encode_name for field in msgspec.structs.fields(kind)}
-    assert schema["properties"].keys() <= names
+    assert described["properties"].keys() <= names
 
 
 def test_what_may_be_null_is_nullable_and_what_can_be_drawn_is_there():
-    reply = msgspec.json.decode(channel_schema("PublishedReply"))["properties"]
+    reply = msgspec.json.decode(channel_schema("PublishedReply", DEFINITIONS))["properties"]
     assert reply["set_points"]["nullable"]
     points = reply["set_points"]["properties"]
     assert points["utilisation"]["type"] == "number"
