@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from itertools import islice, product
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 
 import numpy as np
 
@@ -24,17 +24,12 @@ from planner.robots import Robot, scene_number
 from planner.route.climb import Move, Route
 
 __all__ = [
-    "KnownBranches",
     "bodies_until_lifted",
     "candidates_on",
     "ends_of_swing",
     "start_joints",
     "swing_to",
 ]
-
-KnownBranches = Callable[[str, Pose, Pose], Array]
-"""Returns joint angles of a limb, shape (k, n) [rad], that are known to put its hand on a pose in W
-from a pose of the body; k may be zero."""
 
 
 def bodies_until_lifted(
@@ -152,7 +147,6 @@ def ends_of_swing(
     scene: CollisionScene,
     body: Pose,
     joints: Mapping[str, Array],
-    known: KnownBranches | None = None,
 ) -> list[list[Array]]:
     """Return joint angles with which the hand of a move may come to its new hold, by kinds [rad].
 
@@ -170,13 +164,10 @@ def ends_of_swing(
         Pose of B in W.
     joints : mapping of str to ndarray, shape (n,)
         Present angles of all limbs [rad].
-    known : callable, optional
-        Angles that are tried before others are searched for.
     """
     limb, place = route.moves[done - 1].hand.limb, route.moves[done - 1].hand.pose
     bodies, lifts = bodies_until_lifted(body, route.moves[done:], limb, route.end)
     most, near = 6, joints[limb]
-    ready = [] if known is None else [*known(limb, body, place)]
 
     def clear(angles: Sequence[Array], until: Sequence[Pose], leaves: bool) -> list[list[Array]]:
         found = lasting(scene, limb, place, until, joints, angles, lifts=leaves)
@@ -185,10 +176,7 @@ def ends_of_swing(
             kinds[0 if whole else 1].append(each)
         return [kind for kind in kinds if kind]
 
-    found = clear(ready, bodies, lifts)
-    if found:
-        return found
-    others = _nearest([*candidates_on(scene.robot, limb, place, bodies, near), *ready], near)
+    others = _nearest(candidates_on(scene.robot, limb, place, bodies, near), near)
     for until in (bodies, bodies[: (len(bodies) + 1) // 2], bodies[:1]):
         found = clear(others, until, lifts and until is bodies)
         if found:
@@ -231,10 +219,7 @@ def swing_to(
 
 
 def start_joints(
-    route: Route,
-    scene: CollisionScene,
-    found: Mapping[str, Array],
-    known: KnownBranches | None = None,
+    route: Route, scene: CollisionScene, found: Mapping[str, Array]
 ) -> dict[str, Array]:
     """Return joint angles of the start stance of limbs whose joints are to be found.
 
@@ -245,8 +230,6 @@ def start_joints(
     found : mapping of str to ndarray, shape (n,)
         Angles of all limbs, those to be found with low torques [rad]. They are kept where nothing
         better is found.
-    known : callable, optional
-        Angles that are tried before others are searched for.
     """
     joints, start = dict(found), route.start
 
@@ -256,35 +239,17 @@ def start_joints(
         clear = lasting(scene, hand.limb, hand.pose, until, joints, angles, lifts=leaves)
         return next((each for each, _ in clear), None)
 
-    if known is not None:
-        joints |= _clear_together(route, scene, joints, known)
     for place in start.hands:
         if place.limb not in start.solved_limbs:
             continue
         limb, near = place.limb, joints[place.limb]
         whole, lifts = bodies_until_lifted(start.body, route.moves, limb, route.end)
-        ready = [] if known is None else [*known(limb, start.body, place.pose)]
-
-        chosen = best(place, [near, *ready], whole, lifts)
+        chosen = best(place, [near], whole, lifts)
         if chosen is None:
-            others = [near, *candidates_on(scene.robot, limb, place.pose, whole, near), *ready]
+            others = [near, *candidates_on(scene.robot, limb, place.pose, whole, near)]
             chosen = best(place, others, whole, lifts)
             if chosen is None:
                 chosen = best(place, others, [start.body], False)
         if chosen is not None:
             joints[limb] = chosen
     return joints
-
-
-def _clear_together(
-    route: Route, scene: CollisionScene, found: Mapping[str, Array], known: KnownBranches
-) -> dict[str, Array]:
-    """Return the first known angles of the start's limbs at which nothing meets; {} without any."""
-    start = route.start
-    hands = [hand for hand in start.hands if hand.limb in start.solved_limbs]
-    choices = [[*known(hand.limb, start.body, hand.pose)] for hand in hands]
-    for angles in product(*choices):
-        chosen = dict(zip((hand.limb for hand in hands), angles, strict=True))
-        if scene.nearest(start.body, {**found, **chosen}).distance >= 0.0:
-            return chosen
-    return {}

@@ -29,7 +29,7 @@ from planner.programs import CAP_SLACK
 from planner.question import HandOnHold, Objective
 from planner.robots import UnreachableError, solve_limbs
 from planner.route.between import Passage
-from planner.route.branch_choice import KnownBranches, ends_of_swing, start_joints, swing_to
+from planner.route.branch_choice import ends_of_swing, start_joints, swing_to
 from planner.route.climb import Move, Route, stages
 from planner.route.first_checks import checked_stages, climb_scene, refuse
 from planner.route.held import (
@@ -59,7 +59,6 @@ def plan_climb(
     settings: ClimbSettings | None = None,
     progress: Callable[[int, int], None] | None = None,
     *,
-    known: KnownBranches | None = None,
     after: Climb | None = None,
     knots: Callable[[Sequence[Knot]], None] | None = None,
 ) -> Climb:
@@ -78,8 +77,6 @@ def plan_climb(
         Rates of the controller; those of ``climb.toml`` by default.
     progress, knots : callable, optional
         Called after each move with the numbers of moves planned and in all; with all knots so far.
-    known : callable, optional
-        Joint angles that are tried before others are searched for.
     after : Climb, optional
         Of the same start, load and limits: its knots are kept while moves are the same objects.
 
@@ -97,7 +94,7 @@ def plan_climb(
     solved = replace(route, start=replace(route.start, joints=joints))
     refuse(solved)
     rates = (settings or ClimbSettings()).complete()
-    planner, failure = _Planner(solved, rates, known), None
+    planner, failure = _Planner(solved, rates), None
     try:
         begun = planner.begin() if after is None or not after.held else planner.branch_off(after)
         for number, move in enumerate(route.moves[begun:], start=begun + 1):
@@ -134,12 +131,10 @@ class _Planner:
 
     _at: HeldPosture
 
-    def __init__(
-        self, route: Route, settings: ClimbSettings, known: KnownBranches | None = None
-    ) -> None:
+    def __init__(self, route: Route, settings: ClimbSettings) -> None:
         self.knots: list[Knot] = []
         self.held: list[HeldPosture] = []
-        self._route, self._settings, self._known = route, settings, known
+        self._route, self._settings = route, settings
         self._numbers = KnotNumbers.bundled()
         self._stages = checked_stages(route)
         self._scene = climb_scene(route)
@@ -156,7 +151,7 @@ class _Planner:
         with self._in("start"):
             where = posture(self._stages[0].question)
             assert where is not None
-            angles = start_joints(self._route, self._scene, where.angles, self._known)
+            angles = start_joints(self._route, self._scene, where.angles)
             nearest = self._scene.nearest(stance.body, angles)
             if nearest.distance < 0.0:
                 raise NoPlanError(str(nearest))
@@ -254,7 +249,7 @@ class _Planner:
             kinds = [[given]]
         else:
             here = self._route, self._move, self._scene, posed.body, posed.angles
-            kinds = ends_of_swing(*here, self._known)
+            kinds = ends_of_swing(*here)
         if not kinds:
             target = posed.body.inverse() @ move.hand.pose
             solve_limbs(self._route.start.robot, {limb: target}, {}, np.zeros(3))
