@@ -159,10 +159,10 @@ class CompliantFingers:
             [each.section for each in fingers],
             [list(each.depths) for each in fingers],
         )
-        losses = pad_tiles([each.losses for each in fingers], 0.0)
+        losses = pad_tiles([each.losses for each in fingers])
         self._regimes = TendonRegimes([each.anchored for each in fingers], losses, scheme)
         self._zero, self._per_newton = (
-            pad_tiles([each.shears[:, k] for each in fingers], 0.0)[..., None] for k in (0, 1)
+            pad_tiles([each.shears[:, k] for each in fingers])[..., None] for k in (0, 1)
         )
         # where each phalanx is among its finger's tiles
         own, tiles = np.arange(len(fingers))[:, None], np.arange(len(PHALANGES))

@@ -308,9 +308,9 @@ class TendonBatch:
     """
 
     def __init__(self, tendons: Sequence[FingerTendon], driven: Sequence[bool]) -> None:
-        own = pad_tiles([np.ones(len(each.pulley_radii)) for each in tendons], 0.0)
-        self._stiffness = k = pad_tiles([each.contact_stiffness for each in tendons], 0.0)
-        self._radii = pad_tiles([each.pulley_radii for each in tendons], 0.0)
+        own = pad_tiles([np.ones(len(each.pulley_radii)) for each in tendons])
+        self._stiffness = k = pad_tiles([each.contact_stiffness for each in tendons])
+        self._radii = pad_tiles([each.pulley_radii for each in tendons])
         self._ratio = c = np.array([[each.pulley_ratio] for each in tendons])
         springs = np.array([[each.spring_stiffness] for each in tendons])
         # how far a tile travels per newton, and a phalanx's share of tendon then [m/N]
@@ -368,15 +368,13 @@ class TendonBatch:
         return after, shears + pushed + k * travel
 
 
-def pad_tiles(rows: Sequence[Sequence[float] | Array], fill: float) -> Array:
-    """Return numbers of tiles as one array (F, n), from rows of different lengths.
+def pad_tiles(rows: Sequence[Sequence[float] | Array]) -> Array:
+    """Return numbers of tiles as one array (F, n), rows with fewer than n tiles ending in zeros.
 
     Parameters
     ----------
     rows : sequence of sequence of float, length F
         One number for each tile of each finger.
-    fill : float
-        Number put at the end of rows with fewer than n tiles.
     """
     count = max(map(len, rows))
-    return np.array([[*row, *[fill] * (count - len(row))] for row in rows], dtype=float)
+    return np.array([[*row, *[0.0] * (count - len(row))] for row in rows], dtype=float)

@@ -65,11 +65,11 @@ class TendonRegimes:
 
     def __init__(self, tendons: Sequence[FingerTendon], losses: Array, scheme: MotorScheme) -> None:
         self.scheme = scheme
-        stiffness = pad_tiles([tendon.contact_stiffness for tendon in tendons], 0.0)
-        radii = pad_tiles([tendon.pulley_radii for tendon in tendons], 0.0)
+        stiffness = pad_tiles([tendon.contact_stiffness for tendon in tendons])
+        radii = pad_tiles([tendon.pulley_radii for tendon in tendons])
         ratio = np.array([tendon.pulley_ratio for tendon in tendons])[:, None]
         count, n = losses.shape
-        own = pad_tiles([np.ones(len(tendon.pulley_radii)) for tendon in tendons], 0.0)
+        own = pad_tiles([np.ones(len(tendon.pulley_radii)) for tendon in tendons])
         springs = np.array([tendon.spring_stiffness for tendon in tendons])[:, None]
         give = own / (stiffness + np.where(own > 0.0, springs, 1.0))
         by_tile = losses, stiffness, radii, give, ratio

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import permutations
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -189,25 +190,23 @@ def every_hold(trials: Trials, limb: str) -> Iterator[Change]:
                 yield search.change(_Hold(like, place, turn))
 
 
-def try_new_holds(trials: Trials, most: int = 1) -> None:
-    """Plan new holds for all limbs, and refine the best ones.
+def try_new_holds(trials: Trials) -> None:
+    """Plan new holds for all limbs, and refine the best one.
 
     Parameters
     ----------
     trials : Trials
         Budget of plans, which collects the results.
-    most : int, optional
-        Number of limbs whose best hold is refined, once each limb has had a plan.
     """
     limbs = trials.base.prepared.limbs
-    searches = []
+    found: list[tuple[float, NewHold]] = []
     for limb in trials.question.stance.robot.limbs:
         search = NewHold(trials, limb)
         search.probe(SETTINGS.quarter_turns[:1] if limb in limbs else SETTINGS.quarter_turns)
-        searches += [] if search.best is None else [search]
-    searches.sort(key=lambda search: search.best[0].utilisation if search.best else math.inf)
-    for search in searches[:most]:
-        search.refine()
+        if search.best is not None:
+            found.append((search.best[0].utilisation, search))
+    if found:
+        min(found, key=itemgetter(0))[1].refine()
 
 
 def _sharing(prepared: PreparedStance) -> set[int]:

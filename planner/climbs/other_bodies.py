@@ -15,7 +15,7 @@ __all__ = ["detours"]
 
 
 def detours(
-    wall: Wall, checks: MoveChecks, states: Sequence[State], step: ClimbStep, most: int = 6
+    wall: Wall, checks: MoveChecks, states: Sequence[State], step: ClimbStep
 ) -> Iterator[list[State]]:
     """Yield climbs in which one move is made from another pose of the body, the best first.
 
@@ -27,12 +27,10 @@ def detours(
         The climb.
     step : ClimbStep
         The move.
-    most : int
-        Climbs at most.
     """
     if step.lift is None or step.place is None:
         return
-    at = list(states).index(step.lift)
+    at, most = list(states).index(step.lift), 6  # climbs
     before, limb = step.shifts[-1], step.limb
     used = [*before.members, step.place.members[limb]]
     there = wall.reach.reached[used][:, :, [*range(len(before.members)), limb]]

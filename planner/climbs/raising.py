@@ -18,7 +18,7 @@ __all__ = ["raises"]
 
 
 def raises(
-    wall: Wall, state: State, stage: Question, factor: float, part: float = 0.1
+    wall: Wall, state: State, stage: Question, factor: float
 ) -> tuple[tuple[Raise, Question], ...]:
     """Return changes of a stage that raise its load factor, the best first, and what is then asked.
 
@@ -30,8 +30,6 @@ def raises(
     stage : Question
     factor : float
         Its load factor.
-    part : float
-        By which the rock under a hand is to be stronger, or the mass less.
 
     Returns
     -------
@@ -39,6 +37,7 @@ def raises(
         With another placement the joints are to be found.
     """
     found = list[tuple[Raise, Question]]()
+    part = 0.1  # by which the rock under a hand is to be stronger, or the mass less
     for i, hand in enumerate(stage.stance.hands):
         hands = list(stage.stance.hands)
         hands[i] = replace(hand, surface=hand.surface.times(1.0 + part))
@@ -67,12 +66,10 @@ def _planned(
     return [(Raise(kind=kind, limb=limb, change=words, load_factor=factor), question)]
 
 
-def _elsewhere(
-    wall: Wall, state: State, stage: Question, most: int = 8
-) -> list[tuple[Raise, Question]]:
+def _elsewhere(wall: Wall, state: State, stage: Question) -> list[tuple[Raise, Question]]:
     """Return the best other placement of each hand, by linear programs of those that look best."""
     found = list[tuple[Raise, Question]]()
-    members = np.array(state.members)
+    members, most = np.array(state.members), 8  # programs of a hand
     for limb, present in enumerate(state.members):
         others = np.delete(members, limb)
         fits = wall.reach.reached[:, state.body, limb] & wall.apart[:, others[others >= 0]].all(1)

@@ -58,18 +58,12 @@ class Stepping:
         Of a search of the same wall with the same ends.
     least : float
         Least load factor.
-    settings : StepSettings, optional
     """
 
     def __init__(
-        self,
-        checks: MoveChecks,
-        ends: tuple[Ends, Ends],
-        memory: SearchMemory,
-        least: float,
-        settings: StepSettings | None = None,
+        self, checks: MoveChecks, ends: tuple[Ends, Ends], memory: SearchMemory, least: float
     ) -> None:
-        self._wall, self._least, self._settings = checks.wall, least, settings or StepSettings()
+        self._wall, self._least, self._settings = checks.wall, least, StepSettings()
         self._start, self._goal = ends
         self._checks, self._steps = checks, StepChecks(checks)
         self._programs = memory.programs or Programs(checks.wall.screening)

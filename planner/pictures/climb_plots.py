@@ -52,7 +52,7 @@ def draw_climb(climb: Climb, result: RouteResult) -> Figure:
         among them.
     """
     shown = _shown(climb)
-    figure, panels, lower = _panels(len(shown), height=2.4, below=3.2)
+    figure, panels, lower = _panels(len(shown), below=3.2)
     FigureCanvasAgg(figure)  # which measures texts
     seen = view_directions(result.stages[0].question.stance)
     right = np.cross(seen.ahead, WORLD_UP)
@@ -122,7 +122,7 @@ def draw_support(climb: Climb, result: RouteResult) -> Figure | None:
         regions = [com_region(space) for space in spaces]
     except InvalidInputError:
         return None
-    figure, panels, _ = _panels(len(shown), height=2.4, below=0.0)
+    figure, panels, _ = _panels(len(shown), below=0.0)
     places: list[Array] = []
     for axes, knot, region in zip(panels, shown, regions, strict=True):
         if region.polygon is not None:
@@ -294,12 +294,12 @@ def _draw_margins(axes: Any, climb: Climb) -> None:
     axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=10, frameon=False)
 
 
-def _panels(count: int, height: float, below: float) -> tuple[Figure, list[Any], Any]:
+def _panels(count: int, below: float) -> tuple[Figure, list[Any], Any]:
     """Return a figure with panels in rows, and one axes as wide as all of them below.
 
-    ``height``: of a row; ``below``: of the axes below, zero for none [inch].
+    ``below``: height of the axes below, zero for none [inch].
     """
-    columns = min(count, 6)
+    columns, height = min(count, 6), 2.4  # [inch] of a row
     rows = math.ceil(count / columns)
     size = (max(1.85 * columns, 9.0), height * rows + below + 0.8)
     figure = Figure(figsize=size, layout="constrained")

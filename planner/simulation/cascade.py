@@ -106,9 +106,7 @@ class Cascade:
     prepared : PreparedStance
         All wrists are fixed, and no nail hooks.
     loads : Loads
-        The plan's.
-    slipped : ndarray of bool, shape (T + H,), optional
-        Tiles that drag, and palms that have slipped, before the plan; none by default.
+        The plan's, before which nothing has slipped.
 
     Attributes
     ----------
@@ -120,9 +118,7 @@ class Cascade:
         States of the fingers at the plan's tensions.
     """
 
-    def __init__(
-        self, prepared: PreparedStance, loads: Loads, slipped: Flags | None = None
-    ) -> None:
+    def __init__(self, prepared: PreparedStance, loads: Loads) -> None:
         batch = prepared.batch
         self._batch = batch
         places, T, H = batch.places, len(batch.engagement), len(batch.hands)
@@ -160,7 +156,7 @@ class Cascade:
         self._planes = _half_planes(prepared)
         self._rub_stiffness = BALANCE_SETTINGS.soft * batch.hands[0].hand.lateral_stiffness
         self._rubs = BALANCE_SETTINGS.rubs * max(1.0, float(np.linalg.norm(prepared.wrench[:3])))
-        self._load(loads, np.zeros(T + H, dtype=bool) if slipped is None else slipped)
+        self._load(loads, np.zeros(T + H, dtype=bool))
 
     def _load(self, loads: Loads, gone: Flags) -> None:
         """Set what follows from a plan's loads, and from what has slipped before it."""

@@ -287,7 +287,7 @@ def floating_fingers(hands: tuple[SettledHand, ...], driven: Mapping[int, bool])
         tilts=np.exp(-1j * tilts),
         contacts=contacts,
         tendons=TendonBatch(tendons, [driven[h] for h in giving for _ in FINGERS]),
-        stiffness=pad_tiles([tendon.contact_stiffness for tendon in tendons], 0.0),
+        stiffness=pad_tiles([tendon.contact_stiffness for tendon in tendons]),
         losses=(1.0 - losses[:, None]) ** np.arange(n),
         resists=resists,
         compliance=compliance,

@@ -90,22 +90,20 @@ class Planned(NamedTuple):
             reply.poses = placed_poses(question.stance)
         return cls(question, answer, reply)
 
-    def in_detail(self, detail: Detail, *, model: bool = False) -> Planned:
+    def in_detail(self, detail: Detail) -> Planned:
         """Return the same question and plan with a reply in another detail.
 
         Parameters
         ----------
         detail : {'set_points', 'hands', 'full'}
             How much of the plan the new reply contains; see `of`.
-        model : bool, optional
-            True if a full reply has the load laws of tiles and the wrench spaces of hands.
 
         Returns
         -------
         Planned
             Question, plan and the new reply.
         """
-        return Planned.of(self.question, self.plan, self.reply.id, detail, model=model)
+        return Planned.of(self.question, self.plan, self.reply.id, detail, model=False)
 
 
 def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.PlanReply:

@@ -99,14 +99,14 @@ def test_tendons_of_other_lengths_change_nothing_of_each_other(scheme):
         [size * rng.normal(size=(m, len(state.shears))) for _, state in pairs]
         for size in (2e-3, 0.05)
     )
-    losses = pad_tiles([state.tensions / state.motor_tension for _, state in pairs], 0.0)
+    losses = pad_tiles([state.tensions / state.motor_tension for _, state in pairs])
     regimes = TendonRegimes([tendon for tendon, _ in pairs], losses, scheme)
 
     def padded(parts):
         return np.array([np.pad(part.T, ((0, 4 - part.shape[1]), (0, 0))) for part in parts])
 
     tension = np.full((len(pairs), m), 37.0)
-    rest = pad_tiles([state.shears for _, state in pairs], 0.0)[..., None]
+    rest = pad_tiles([state.shears for _, state in pairs])[..., None]
     found = regimes.respond(padded(slips), padded(turns), tension, rest)
     for i, (tendon, state) in enumerate(pairs):
         alone = respond(tendon, state, scheme, slips[i], turns[i])
