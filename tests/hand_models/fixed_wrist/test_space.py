@@ -19,20 +19,14 @@ from tests.suite.helpers.hands import (
     ROCK,
     changed_hand,
     limiting,
+    own_tiles,
     partly,
     pinch,
+    tile_load,
     without_hand_load,
 )
 
 seeds = st.integers(0, 2**32 - 1)
-
-
-def tile_load(settled, t, tension):
-    return settled.loads[t, :, 0] + settled.loads[t, :, 1] * tension
-
-
-def own_tiles(settled, i):
-    return np.flatnonzero((settled.finger_of == i) & settled.touching)
 
 
 def without_structure(space):

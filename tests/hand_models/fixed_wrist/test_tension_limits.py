@@ -5,11 +5,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import strategies as st
+from hypothesis import assume, strategies as st
 
 from hand_models import FINGERS, Cylinder, Pose, Surface, tension_limits
 from hand_models.fixed_wrist import wrench_space
-from tests.suite.helpers.hands import HAND, ROCK, pinch, settled_at
+from tests.suite.helpers.hands import HAND, ROCK, own_tiles, pinch, settled_at, tile_load
 from tests.suite.helpers.shares import given_some
 
 seeds = st.integers(0, 2**32 - 1)
@@ -25,24 +25,15 @@ def law(surface, shear, normal):
     return surface.shear_limit - (surface.shear_limit - surface.pull_off_limit) * share
 
 
-def tile_load(settled, t, tension):
-    return settled.loads[t, :, 0] + settled.loads[t, :, 1] * tension
-
-
 def beyond(settled, t, tension):
     load = tile_load(settled, t, tension) / settled.engagement[t]
     return np.hypot(*load) > law(settled.surface, *load)
 
 
-def own_tiles(settled, i):
-    return np.flatnonzero((settled.finger_of == i) & settled.touching)
-
-
 @given_some(5, 60, seeds)
 def test_from_closing_up_to_f_t_max_a_scan_finds_no_tile_beyond_its_law(seed):
     settled = settled_at(seed)
-    if settled is None:
-        return
+    assume(settled is not None)
     start = settled.closing_tension
     for i, limit in enumerate(tension_limits(settled)):
         assert limit.finger == FINGERS[i]
@@ -58,8 +49,7 @@ def test_from_closing_up_to_f_t_max_a_scan_finds_no_tile_beyond_its_law(seed):
 @given_some(5, 100, seeds)
 def test_just_below_f_t_max_every_tile_holds_and_just_above_its_tile_lets_go(seed):
     settled = settled_at(seed)
-    if settled is None:
-        return
+    assume(settled is not None)
     for i, limit in enumerate(tension_limits(settled)):
         if not math.isfinite(limit.tension) or limit.tension == 0.0:
             continue

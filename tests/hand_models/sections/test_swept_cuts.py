@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import assume, given, strategies as st
 
 from hand_models import Cylinder, Edge, Ellipsoid, Plane, Sphere
 from hand_models.rock import Hold
@@ -43,17 +43,13 @@ def random_cut(seed: int):
         return distance(hold, origin + points.real * axes[:, 0] + points.imag * axes[:, 2])
 
     joint = complex(*rng.uniform([-0.05, -0.05], [0.05, 0.01]))
-    if cut is None or away(joint) < 1e-4:
-        return None
+    assume(cut is not None and away(joint) >= 1e-4)
     return cut, away, joint
 
 
 @given(seeds)
 def test_places_are_in_the_rock_where_their_distance_is_negative(seed):
-    found = random_cut(seed)
-    if found is None:
-        return
-    cut, away, joint = found
+    cut, away, joint = random_cut(seed)
     rng = np.random.default_rng(seed + 1)
     points = joint + rng.normal(0.0, 0.03, 20) + 1j * rng.normal(0.0, 0.03, 20)
     for point, far in zip(points.tolist(), away(points).tolist(), strict=True):
@@ -65,10 +61,7 @@ def test_places_are_in_the_rock_where_their_distance_is_negative(seed):
 
 @given_some(12, 300, seeds)
 def test_a_tangent_line_touches_the_rock_and_does_not_cut_it(seed):
-    found = random_cut(seed)
-    if found is None:
-        return
-    cut, away, joint = found
+    cut, away, joint = random_cut(seed)
     tangent = cut.tangent(joint, FACE.height)
     if tangent is None:
         return
@@ -84,10 +77,7 @@ def test_a_tangent_line_touches_the_rock_and_does_not_cut_it(seed):
 
 @given_some(12, 300, seeds, st.sampled_from([FACE.start, FACE.end]))
 def test_where_a_point_on_a_circle_enters_the_rock_is_found(seed, along):
-    found = random_cut(seed)
-    if found is None:
-        return
-    cut, away, joint = found
+    cut, away, joint = random_cut(seed)
     arm = abs(complex(along, FACE.height))
     ways = cut.entries(joint, arm)
     for way in ways:
@@ -106,10 +96,7 @@ def test_where_a_point_on_a_circle_enters_the_rock_is_found(seed, along):
 
 @given_some(12, 300, seeds, st.floats(-3.1, 3.1))
 def test_a_face_is_clear_where_all_its_places_are_outside(seed, angle):
-    found = random_cut(seed)
-    if found is None:
-        return
-    cut, away, joint = found
+    cut, away, joint = random_cut(seed)
     u = cmath.rect(1.0, angle)
     places = joint + (np.linspace(FACE.start, FACE.end, 201) + 1j * FACE.height) * u
     least = away(places).min()
@@ -125,10 +112,7 @@ def test_a_face_is_clear_where_all_its_places_are_outside(seed, angle):
 @given_some(12, 150, seeds)
 def test_a_face_rests_where_it_first_meets_the_rock(seed):
     """By the rock's distance function alone: clear until then, and on it there."""
-    found = random_cut(seed)
-    if found is None:
-        return
-    cut, away, joint = found
+    cut, away, joint = random_cut(seed)
     low, high = -0.5, 1.7
     along = np.linspace(FACE.start, FACE.end, 100)
 

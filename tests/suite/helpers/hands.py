@@ -116,6 +116,16 @@ def settled_at(seed: int, lateral: bool | None = None) -> SettledHand | None:
         return None
 
 
+def tile_load(settled: SettledHand, t: int, tension: float) -> np.ndarray:
+    """Shear and normal load of a tile at a tension of its tendon [N]."""
+    return settled.loads[t, :, 0] + settled.loads[t, :, 1] * tension
+
+
+def own_tiles(settled: SettledHand, i: int) -> np.ndarray:
+    """Tiles of a finger that touch the rock."""
+    return np.flatnonzero((settled.finger_of == i) & settled.touching)
+
+
 def limiting(share: float, least: float = 0.1) -> float:
     """Part of a whole tile's strength that limits a tile with a share of its spines on rock."""
     return share if share >= least else share + (least - share) ** 2 / (2.0 * least)
