@@ -194,22 +194,28 @@ def test_every_smaller_set_of_small_systems_has_loads(data):
     assert set(sufficient_alone(parts, found)) == alone
 
 
+def proofs(status, seeds):
+    """Of random stances: label, certificate, and rows by their names."""
+    for label, question, answer in explained(status, seeds):
+        proof = answer.certificate
+        assert proof is not None, label
+        assert proof.irreducible is not None, label
+        yield label, proof, named_rows(question, proof.utilisation)
+
+
 @pytest.mark.parametrize("status", ["infeasible", "overloaded"])
 @few_and_all
 def test_random_stances_lack_loads_with_their_set_and_have_some_without_any_one_of_it(
     status, seeds
 ):
-    for label, question, answer in explained(status, seeds):
-        proof = answer.certificate
-        assert proof is not None, label
-        assert proof.irreducible is not None, label
-        parts = named_rows(question, proof.utilisation)
+    sizes = []
+    for label, proof, parts in proofs(status, seeds):
         assert set(proof.irreducible) <= parts.constraints, label
         assert not have_loads(parts, proof.irreducible), label
         for name in proof.irreducible:
             others = [other for other in proof.irreducible if other != name]
             assert have_loads(parts, others), f"{label}: {name} is not needed"
-    sizes = [len(answer.certificate.irreducible) for _, _, answer in explained(status, seeds)]
+        sizes.append(len(proof.irreducible))
     assert max(sizes) > 3
 
 
@@ -230,13 +236,11 @@ def test_what_programs_leave_undecided_is_guessed_at():
 def test_of_random_stances_those_are_told_that_would_do_alone(status, seeds):
     """Of the other constraints that the proof weighs none does, either."""
     told = []
-    for label, question, answer in explained(status, seeds):
-        proof = answer.certificate
+    for label, proof, parts in proofs(status, seeds):
         if proof.sufficient is None:
             assert len(proof.irreducible) > 16, label
             continue
         told.append(proof.sufficient)
-        parts = named_rows(question, proof.utilisation)
         alone = {
             name
             for name in {*proof.irreducible, *proof.blocking}
@@ -295,14 +299,10 @@ def loads_within(parts: HardRowSystem, names, most: float) -> bool:
 @few_and_all
 def test_certificates_say_up_to_which_loads_their_set_blocks(status, seeds):
     """Beyond the box in which it was found, HiGHS finds none up to there, either."""
-    for label, question, answer in explained(status, seeds):
-        proof = answer.certificate
-        assert proof is not None, label
-        assert proof.irreducible is not None, label
+    for label, proof, parts in proofs(status, seeds):
         up_to = proof.irreducible_up_to
         assert up_to is None or up_to >= 1e6, label
         most = min(up_to or np.inf, 1e8)
-        parts = named_rows(question, proof.utilisation)
         rows = [name in proof.irreducible for name in parts.names]
         tied = [name in proof.irreducible for name in parts.owners]
         scale = 1e3

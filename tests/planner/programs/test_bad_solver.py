@@ -48,11 +48,16 @@ LIES = {
 }
 
 
+def all_say(monkeypatch, outcome: Outcome) -> None:
+    """Let every program of a plan end so."""
+    for name in ("unique", "margin", "vertex"):
+        monkeypatch.setattr(programs, name, lambda *_: outcome)
+
+
 @pytest.mark.parametrize("lie", LIES.values(), ids=LIES.keys())
 def test_a_solver_that_lies_about_its_solution_gets_failed(monkeypatch, lie):
     outcome = lie(honest_outcome())
-    for name in ("unique", "margin", "vertex"):
-        monkeypatch.setattr(programs, name, lambda *_: outcome)
+    all_say(monkeypatch, outcome)
     answer = plan(replace(QUESTION, want=frozenset({"prices", "load_factor"})))
     assert answer.status == "failed"
     assert not answer.verified
@@ -93,8 +98,7 @@ def test_a_solver_that_ignores_a_hard_row_gets_failed(
         limit_duals=tuple(np.zeros(len(hand.l0)) for hand in hands),
         hard_duals=tuple(np.zeros(len(hand.h)) for hand in hands),
     )
-    for name in ("unique", "margin", "vertex"):
-        monkeypatch.setattr(programs, name, lambda *_: lie)
+    all_say(monkeypatch, lie)
     # the second look finds the truth, with a proof; without it, the lie is all there is
     truth = plan(question)
     assert truth.status == "infeasible"
@@ -109,8 +113,7 @@ def test_a_solver_that_ignores_a_hard_row_gets_failed(
 @pytest.mark.parametrize("word", ["infeasible", "user_limit", "solver_error"])
 def test_a_solver_that_gives_up_gets_failed_and_never_infeasible(monkeypatch, word):
     nothing = Outcome(False, word, 0, float("nan"))
-    for name in ("unique", "margin", "vertex"):
-        monkeypatch.setattr(programs, name, lambda *_: nothing)
+    all_say(monkeypatch, nothing)
     answer = plan(QUESTION)
     assert answer.status == "failed"
     assert answer.certificate is None
@@ -126,8 +129,7 @@ def test_an_infeasible_stance_whose_distance_is_not_found_is_proven_by_multiplie
     assert answer.status == "infeasible"
     assert answer.certificate.supremum < answer.certificate.needed
     # without these there is no proof, and none is made up
-    for name in ("unique", "margin", "vertex"):
-        monkeypatch.setattr(programs, name, lambda *_: nothing)
+    all_say(monkeypatch, nothing)
     answer = plan(ask(on_wall(Plane(), outer_rotation=0.0)))
     assert answer.status == "failed"
     assert answer.certificate is None
