@@ -170,6 +170,23 @@ def test_file_and_table_say_why_hands_cannot_be_at_places(rock, tmp_path, capfd)
             assert any(outcome.message.startswith(why.split("…")[0]) for why in there["reasons"])
 
 
+def planned_with(hold, rock, tmp_path, capfd):
+    """The plan of a stance whose first hand has a hold that was found, and the pose of its rock."""
+    request = wall_request()
+    hand = request["stance"]["hands"][0]
+    # a wall that faces the body: z of the rock's frame along x of the world
+    position = hand.pop("pose")["position"]
+    pose = {"position": position, "orientation": [0.0, 0.70710678, 0.0, 0.70710678]}
+    request["stance"]["rocks"] = {"wall": {"shape": "mesh", "file": str(rock), "pose": pose}}
+    hand |= {"hold": {"shape": "rock", "rock": "wall"}}
+    hand |= {key: hold[key] for key in ("grasp", "place", "placing")}
+    stance = tmp_path / "stance.json"
+    stance.write_text(json.dumps(request), encoding="utf-8")
+    capfd.readouterr()
+    run_command_line(["plan", str(stance), "--json"])
+    return result(capfd), pose
+
+
 def test_a_plan_is_made_with_a_hold_that_was_proposed(rock, tmp_path, capfd):
     output = tmp_path / "holds.json"
     options = ["-o", str(output), *COARSE, "--samples", "0", "--workers", "1", "--json"]
@@ -177,22 +194,9 @@ def test_a_plan_is_made_with_a_hold_that_was_proposed(rock, tmp_path, capfd):
     told = result(capfd)
     best = json.loads(output.read_text(encoding="utf-8"))["holds"][0]
     assert told["file"] == str(output)
-    request = wall_request()
-    hand = request["stance"]["hands"][0]
-    # a wall that faces the body: z of the rock's frame along x of the world
-    pose = {"position": hand["pose"]["position"], "orientation": [0.0, 0.70710678, 0.0, 0.70710678]}
-    request["stance"]["rocks"] = {"wall": {"shape": "mesh", "file": str(rock), "pose": pose}}
-    hand["hold"] = {"shape": "rock", "rock": "wall"}
-    hand["grasp"] = best["grasp"]
-    hand["place"] = best["place"]
-    del hand["pose"]
-    stance = tmp_path / "stance.json"
-    stance.write_text(json.dumps(request), encoding="utf-8")
-    run_command_line(["plan", str(stance), "--json"])
-    reply = result(capfd)
-    seating = reply["hands"][0]["seating"]
-    assert seating["rule"] == best["seating"]["rule"]
-    assert list(reply["poses"]) == [hand["limb"]]
+    reply, _ = planned_with(best, rock, tmp_path, capfd)
+    assert reply["hands"][0]["seating"]["rule"] == best["seating"]["rule"]
+    assert list(reply["poses"]) == [reply["hands"][0]["limb"]]
 
 
 @pytest.mark.slow
@@ -213,20 +217,9 @@ def test_a_hold_by_contact_is_where_a_plan_places_the_hand_by_contact(tmp_path, 
     assert best["seating"]["rule"] == "contact"
     seat = found["given", tuple(best["place"]["point"])]
     assert best["pose"]["position"][2] > seat["pose"]["position"][2] + 5e-4
-    request = wall_request()
-    hand = request["stance"]["hands"][0]
-    pose = {"position": hand["pose"]["position"], "orientation": [0.0, 0.70710678, 0.0, 0.70710678]}
-    request["stance"]["rocks"] = {"log": {"shape": "mesh", "file": str(log), "pose": pose}}
-    hand |= {"hold": {"shape": "rock", "rock": "log"}, "grasp": best["grasp"]}
-    hand |= {"place": best["place"], "placing": best["placing"]}
-    del hand["pose"]
-    stance = tmp_path / "stance.json"
-    stance.write_text(json.dumps(request), encoding="utf-8")
-    capfd.readouterr()
-    run_command_line(["plan", str(stance), "--json"])
-    reply = result(capfd)
+    reply, pose = planned_with(best, log, tmp_path, capfd)
     assert reply["hands"][0]["seating"]["rule"] == "contact"
-    there = pose_of(pose).inverse() @ pose_of(reply["poses"][hand["limb"]])
+    there = pose_of(pose).inverse() @ pose_of(reply["poses"][reply["hands"][0]["limb"]])
     assert there.position == pytest.approx(best["pose"]["position"], abs=1e-6)
 
 
