@@ -79,8 +79,11 @@ class Sampled:
         """Number of even samples that have the same variance, 1 / Σ w²."""
         return float(1.0 / (self.weights**2).sum())
 
-    def quantiles(self, wide: Array, shares: Sequence[float] = (0.05, 0.5, 0.95)) -> Array:
-        """Return quantiles (s, k) of what is measured, a deviation (k,) about the model's value."""
+    def quantiles(self, wide: Array) -> Array:
+        """Return the quantiles of 5, 50 and 95 %, shape (3, k), of what is measured.
+
+        That is a deviation, ``wide`` (k,), about the model's value.
+        """
         # the normal distribution about each sample, by 51 of its own quantiles
         even = scipy.special.ndtri((np.arange(51) + 0.5) / 51.0)
         parts = self.values[:, None, :] + even[:, None] * wide
@@ -89,7 +92,7 @@ class Sampled:
         for each in parts.reshape(len(weights), -1).T:
             order = each.argsort()
             middles = weights[order].cumsum() - 0.5 * weights[order]
-            found.append(np.interp(shares, middles, each[order]))
+            found.append(np.interp((0.05, 0.5, 0.95), middles, each[order]))
         return np.transpose(found)
 
     def chosen(self, count: int) -> list[int]:

@@ -168,7 +168,7 @@ def fit_line(angles: Array, strengths: Array, pull_off_angle: float) -> LineFit:
     )
 
 
-def fit_lateral(array: SpineArray, pull_off_angle: float, count: int = 46) -> LateralFit:
+def fit_lateral(array: SpineArray, pull_off_angle: float) -> LateralFit:
     """Fit the lateral law of `Surface` to a spine array.
 
     The law is F(φ, θ) / F(φ, 0) = 1 − (1 − λ(φ)) cos φ (1 − cos θ), with λ falling linearly from
@@ -181,9 +181,8 @@ def fit_lateral(array: SpineArray, pull_off_angle: float, count: int = 46) -> La
     array : SpineArray
     pull_off_angle : float
         φ_max [rad].
-    count : int
-        Count of angles φ, and of azimuths θ, of the grid.
     """
+    count = 46  # angles φ, and azimuths θ, of the grid
     share = np.linspace(0.0, 1.0, count)[:, None]
     angle, azimuth = share * pull_off_angle, np.linspace(0.0, math.pi / 2, count)[None, :]
     loss = np.cos(angle) * (1.0 - np.cos(azimuth))

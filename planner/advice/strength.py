@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from planner.advice.changes import SETTINGS, Change, hand_path
-from planner.advice.trials import Trials, Tried
+from planner.advice.trials import Trials
 from planner.question import HandOnHold
 
 __all__ = ["lighter", "stronger"]
@@ -89,8 +89,10 @@ def _surface(hand: HandOnHold, factor: float) -> dict[str, Any]:
     return numbers
 
 
-def lighter(trials: Trials, factor: float | None, most: int) -> list[Tried]:
+def lighter(trials: Trials, factor: float | None, most: int) -> None:
     """Find the largest mass of the body for which the stance is feasible.
+
+    Results are kept in ``trials``: none where a body wrench or an angular acceleration is given.
 
     Parameters
     ----------
@@ -100,19 +102,12 @@ def lighter(trials: Trials, factor: float | None, most: int) -> list[Tried]:
         Load factor of the unchanged stance, where the search starts; None if there is none.
     most : int
         Largest number of plans.
-
-    Returns
-    -------
-    list of Tried
-        That mass, if one was found. Empty, too, where a body wrench or an angular acceleration is
-        given.
     """
     question = trials.question
     load = question.load
     if question.body_wrench is not None or factor is None or any(load.angular_acceleration):
-        return []
+        return
     mass = question.stance.robot.mass if load.mass is None else load.mass
-    found: list[Tried] = []
     low, high = 0.0, min(factor, 1.0)
     share = high * (1.0 - 1e-4)  # a little less than the largest mass
     for _ in range(most):
@@ -123,10 +118,9 @@ def lighter(trials: Trials, factor: float | None, most: int) -> list[Tried]:
         size = -math.log(share) / SETTINGS.strength_unit
         tried = trials.of([Change("mass", (), words, changes, size)])
         if tried and trials.holds(tried[0].utilisation):
-            low, found = share, tried
+            low = share
         else:
             high = share
         if low >= (1.0 - SETTINGS.share_step) * high:
             break
         share = 0.5 * (low + high)
-    return found

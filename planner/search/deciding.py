@@ -64,7 +64,8 @@ class Decision:
         for side in (1, 2):
             seeds = lifts.beside(side - 1)
             seeds = seeds[self._nodes["out"][seeds] == 0]
-            self._claim(side, seeds, -side, -1)
+            self._nodes["claimed"][seeds] |= side
+            self._parents[side][seeds], self._vias[side][seeds] = -side, -1
             self._push(side, seeds)
 
     @property
@@ -110,10 +111,6 @@ class Decision:
             _, found = lifts.find(bodies, members)
             self._nodes["out"][found[found >= 0]] = 1
             self._ways.hindered |= bool((found >= 0).any())
-
-    def _claim(self, side: int, lifts: Indices, parent: int, via: int) -> None:
-        self._nodes["claimed"][lifts] |= side
-        self._parents[side][lifts], self._vias[side][lifts] = parent, via
 
     def _push(self, side: int, lifts: Indices) -> None:
         if len(lifts):

@@ -245,7 +245,7 @@ class _Search:
         if memory.table is not None:
             self._ceiling = self._tried = memory.bound
             return
-        lifts = some_lifts(self._ground, settings.samples, 0)
+        lifts = some_lifts(self._ground, settings.samples)
         half = settings.directions // 2
         self._table = learnt(self._table, self._programs, lifts, half, self._check)
         bounds = self._table.bounds(lifts)

@@ -32,6 +32,12 @@ Ask = Callable[[Iterable[bytes]], Generator[Answer, None, None]]
 
 State = Literal["holds", "overloaded", "infeasible", "error"]
 
+STATES_BY_STATUS: Final[dict[str, State]] = {
+    "optimal": "holds",
+    "overloaded": "overloaded",
+    "infeasible": "infeasible",
+}
+
 LIMIT_PARTS: Final = ("limb", "finger", "phalanx", "joint", "limit")
 
 RESULT_COLUMNS: Final = (
@@ -88,15 +94,7 @@ class SweepRow(msgspec.Struct, frozen=True):
     @property
     def state(self) -> State:
         """Status for pictures: ``holds`` for optimal, and ``error`` for a failed plan, too."""
-        match self.status:
-            case "optimal":
-                return "holds"
-            case "overloaded":
-                return "overloaded"
-            case "infeasible":
-                return "infeasible"
-            case _:
-                return "error"
+        return STATES_BY_STATUS.get(self.status, "error")
 
     @property
     def answered(self) -> bool:
