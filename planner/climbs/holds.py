@@ -174,9 +174,8 @@ class HoldWays:
         wall, (path, at) = self._wall, self.path(hold)
         robot, name = wall.robot, wall.robot.limbs[hold.limb]
         inside = [body.inverse() @ wall.places[hold.place].pose for body in path]
-        n = len(robot.chains[name].joints)
         for j, body in zip(at, hold.bodies, strict=True):
-            known = wall.reach.branches(hold.place, body, hold.limb)[:, :n]
+            known = wall.branches(hold.place, body, hold.limb)
             for angles in branches(robot, name, inside[j], count=12) if more else known:
                 way = angles[None]
                 try:

@@ -160,8 +160,7 @@ class MoveChecks:
         """Return the joint loads of a limb at each of the table's joint angles."""
         key = limb, place, body
         if key not in self._loads:
-            n = len(self.wall.robot.chains[self.wall.robot.limbs[limb]].joints)
-            ways = self.wall.reach.branches(place, body, limb)[:, :n]
+            ways = self.wall.branches(place, body, limb)
             self._loads[key] = [self.programs.loads(*key, angles) for angles in ways]
         return self._loads[key]
 
@@ -180,13 +179,8 @@ class MoveChecks:
         places = state.members[first], state.members[second]
         key = state.body, first, second, *places
         if key not in self._meets:
-            names, reach = self.wall.robot.limbs, self.wall.reach
-            ways = [
-                reach.branches(place, state.body, limb)[
-                    :, : len(self.wall.robot.chains[names[limb]].joints)
-                ]
-                for limb, place in zip((first, second), places, strict=True)
-            ]
+            limbs = zip((first, second), places, strict=True)
+            ways = [self.wall.branches(place, state.body, limb) for limb, place in limbs]
             self._meets[key] = self.clearances.apart((first, second), *ways)
         return self._meets[key]
 

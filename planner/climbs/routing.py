@@ -8,7 +8,6 @@ from functools import partial
 from itertools import pairwise, zip_longest
 from typing import NamedTuple, Self
 
-import numpy as np
 from msgspec import structs
 
 from hand_models.base import Array, Pose
@@ -125,8 +124,6 @@ class RouteMaker:
     def __init__(self, wall: Wall, name: str, limits: Limits, objective: Objective) -> None:
         self.wall, self._name, self.limits, self._objective = wall, name, limits, objective
         self._moves = dict[tuple[int, int, int | None, bytes], Move]()
-        self._places = {_key(each.pose): i for i, each in enumerate(wall.places)}
-        self._bodies = {_key(each): i for i, each in enumerate(wall.bodies)}
 
     def route(
         self,
@@ -159,14 +156,6 @@ class RouteMaker:
             explain=False,
         )
 
-    def branches(self, limb: str, body: Pose, hand: Pose) -> Array:
-        """Return the joint angles of the reach table, shape (k, n) [rad]."""
-        n = len(self.wall.robot.chains[limb].joints)
-        p, b = self._places.get(_key(hand)), self._bodies.get(_key(body))
-        if p is None or b is None:
-            return np.zeros((0, n))
-        return self.wall.reach.branches(p, b, self.wall.robot.limbs.index(limb))[:, :n]
-
     def _hand(self, limb: int, place: int) -> HandOnHold:
         return replace(self.wall.places[place], limb=self.wall.robot.limbs[limb])
 
@@ -186,8 +175,3 @@ class RouteMaker:
             found = Move(hand, shifted)
             self._moves[key] = found if angles is None else replace(found, joints={limb: angles})
         return self._moves[key]
-
-
-def _key(pose: Pose) -> bytes:
-    """Return the digits of a pose."""
-    return pose.position.tobytes() + pose.rotation.tobytes()

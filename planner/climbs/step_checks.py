@@ -7,6 +7,7 @@ placed till they lift; what was found is kept for further steps.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from itertools import product
 from typing import NamedTuple
 
@@ -203,9 +204,8 @@ class StepChecks:
         """
         key = limb, place, body
         if key not in self._clear:
-            count = len(self._wall.robot.chains[self._names[limb]].joints)
             at, of_rock = [self._wall.bodies[body]], self._checks.clearances.of_rock
-            known = self._wall.reach.branches(place, body, limb)[:, :count]
+            known = self._wall.branches(place, body, limb)
             found = [each for each in known if of_rock(limb, at, each[None], holds=True)]
             more = [] if found else self._checks.ways.of(Stay(limb, place, (body,)))
             self._clear[key] = found or [way[0] for way in more]
@@ -216,11 +216,8 @@ class StepChecks:
         key = limb, body, angles.tobytes()
         if key not in self._straight:
             found, at = None, [self._wall.bodies[body]]
-            try:
+            with suppress(BranchEndError):
                 way = straight_off(self._wall.robot, self._names[limb], angles, self._back)
-            except BranchEndError:
-                pass
-            else:
                 clear = self._checks.clearances.of_rock(limb, at, way[-1:], holds=False)
                 found = way if clear else None
             self._straight[key] = found
@@ -253,11 +250,8 @@ class StepChecks:
             path = self._checks.ways.path(Stay(limb, place, (body, other)))[0][1:]
             hand, found = self._wall.places[place].pose, None
             at = [each.inverse() @ hand for each in path]
-            try:
+            with suppress(BranchEndError):
                 way = follow_poses(self._wall.robot, self._names[limb], posture.angles[limb], at)
-            except BranchEndError:
-                pass
-            else:
                 clear = self._checks.clearances.of_rock(limb, path, way, holds=True)
                 found = way if clear else None
             self._followed[key] = found

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Indices, Pose
+from hand_models.base import Array, Indices, Pose
 from planner.question import HandOnHold
 from planner.reach import ReachTable
 from planner.robots import Robot
@@ -61,6 +61,11 @@ class Wall:
     reach: ReachTable
     screening: ScreeningTable
     apart: NDArray[np.bool_]
+
+    def branches(self, place: int, body: int, limb: int) -> Array:
+        """Return the joint angles of a limb in the reach table, shape (a, n) [rad]."""
+        n = len(self.robot.chains[self.robot.limbs[limb]].joints)
+        return self.reach.branches(place, body, limb)[:, :n]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
