@@ -33,7 +33,7 @@ __all__ = ["AnswerOutcome", "ReplyLines", "Run", "TableLines"]
 
 
 class AnswerOutcome(NamedTuple):
-    """What came of a question, for the tally; the time is in s."""
+    """Outcome of a question, for the tally; the time is in s."""
 
     status: str | None
     error: ErrorDetail | None
