@@ -53,15 +53,15 @@ def interruptible() -> Iterator[None]:
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
     """Answer the first signal: let the command end by itself, but not for ever."""
-    above = set(_modules_above(frame))
-    if "numba" in above and IMPORT_MODULE not in above:
+    packages, caller = _above(frame)
+    if caller is not None and IMPORT_MODULE not in packages:
         # a compiled function that takes its arguments goes on whatever is raised there, and what
-        # comes of that is an error of another kind: the signal comes again
-        threading.Timer(0.01, os.kill, (os.getpid(), number)).start()  # [s]
+        # comes of that is an error of another kind
+        _interrupt_in(caller, number)
         return
     for each in ENDING_SIGNALS:
         signal.signal(each, _end)
-    if IMPORT_MODULE in above:
+    if IMPORT_MODULE in packages:
         # extension modules turn what is raised into errors of their own, or print it
         _end()
     # [s] to keep what is done, and to end
@@ -71,11 +71,29 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     raise Interrupted
 
 
-def _modules_above(frame: FrameType | None) -> Iterator[str]:
-    """Yield the packages whose functions are being run, of a frame and of all that called it."""
+def _above(frame: FrameType | None) -> tuple[set[str], FrameType | None]:
+    """Return the packages of a frame and of all that called it, and what called numba, if any."""
+    packages, caller = set[str](), None
     while frame is not None:
-        yield frame.f_globals.get("__name__", "").partition(".")[0]
+        package = frame.f_globals.get("__name__", "").partition(".")[0]
+        packages.add(package)
         frame = frame.f_back
+        if package == "numba":
+            caller = frame
+    return packages, caller
+
+
+def _interrupt_in(frame: FrameType, number: int) -> None:
+    """Answer a signal as soon as a frame goes on."""
+
+    def trace(frame: FrameType, event: str, _: object) -> None:
+        sys.settrace(None)
+        frame.f_trace = None
+        _interrupt(number, frame)
+
+    frame.f_trace = trace
+    # without one for all functions, those of frames are not called
+    sys.settrace(lambda *_: None)
 
 
 def _end(number: int = 0, frame: FrameType | None = None) -> None:

@@ -267,5 +267,7 @@ with interruptible():
 
 def test_a_signal_while_a_compiled_function_takes_its_arguments_is_answered_after_it():
     called = [sys.executable, "-W", "ignore", "-c", TAKING_ITS_ARGUMENTS]
-    done = subprocess.run(called, capture_output=True, text=True, cwd=ROOT, check=False)
+    done = subprocess.run(
+        called, capture_output=True, text=True, cwd=ROOT, timeout=300.0, check=False
+    )
     assert (done.returncode, done.stderr) == (FAILED, "crux: interrupted\n")
