@@ -240,6 +240,8 @@ def screen_command(candidates: str, best: int, within: str, own: options.Own, as
     Exit status: 0 if a stance has a load factor, 3 if none has, 2 if none can be read.
     """
     part = climbs.part_of_whole(within, "--within")
+    if part >= 1.0:
+        raise InvalidInputError(f"must be less than 100 %, got {within!r}", field="--within")
     names, questions, wrong = [], [], dict[str, str]()
     first: InvalidInputError | None = None
     for name, request in stances.read_candidates(candidates):

@@ -80,3 +80,8 @@ def test_ends_with_3_where_nothing_holds(tmp_path, capfd):
     told = capfd.readouterr()
     assert "no stance has a load factor" in told.out
     assert "set wrist to 'fixed'" in told.err
+
+
+def test_a_part_of_all_or_more_is_refused(capfd):
+    assert run_command_line(["screen", "none.jsonl", "--within", "5"]) == BAD_INPUT
+    assert "--within: must be less than 100 %, got '5'" in capfd.readouterr().err
