@@ -40,7 +40,12 @@ from .frames import (
     wrench_transport as wrench_transport,
     wrench_transports as wrench_transports,
 )
-from .long_work import Progress as Progress, broken_off_by as broken_off_by, go_on as go_on
+from .long_work import (
+    Progress as Progress,
+    broken_off_by as broken_off_by,
+    go_on as go_on,
+    without_collection as without_collection,
+)
 from .message_fields import (
     Acceleration as Acceleration,
     AccelerationEntry as AccelerationEntry,

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import warnings
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
+
+from hand_models.base.long_work import without_collection
 
 __all__ = ["compiled", "has_compiled", "record_of"]
 
@@ -47,7 +47,8 @@ def compiled(*arguments: Argument) -> Callable[[Function], Function]:
     types = [_type(each) for each in arguments]
 
     def decorated(function: Function) -> Function:
-        with warnings.catch_warnings(), _no_garbage_collected():
+        # numba makes millions of objects, and needs most of them
+        with warnings.catch_warnings(), without_collection():
             # that functions are handed over is called experimental, since 2020
             warnings.simplefilter("ignore", numba.NumbaExperimentalFeatureWarning)
             return _made(function)
@@ -61,18 +62,6 @@ def compiled(*arguments: Argument) -> Callable[[Function], Function]:
         return cast("Function", made)
 
     return decorated
-
-
-@contextmanager
-def _no_garbage_collected() -> Iterator[None]:
-    """Look for no garbage meanwhile: numba makes millions of objects, and needs most of them."""
-    was = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was:
-            gc.enable()
 
 
 def has_compiled(module: str) -> bool:

@@ -1,12 +1,13 @@
-"""Progress reports and cancellation of long computations, however deep their calls go."""
+"""Progress, cancellation and garbage of long computations, however deep their calls go."""
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-__all__ = ["Progress", "broken_off_by", "go_on"]
+__all__ = ["Progress", "broken_off_by", "go_on", "without_collection"]
 
 Progress = Callable[[int, int], None]
 """Callback that gets the number of steps done and the number of all steps."""
@@ -38,3 +39,15 @@ def go_on() -> None:
     check = _check.get()
     if check is not None:
         check()
+
+
+@contextmanager
+def without_collection() -> Iterator[None]:
+    """Context manager that pauses the garbage collector, where much is made and little is lost."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()

@@ -34,7 +34,7 @@ from planner.route import (
     evaluate,
     plan_climb,
 )
-from planner.search import Arc, Ends, Found, SearchMemory, State, Wall, search
+from planner.search import Arc, Ends, Found, Proof, SearchMemory, State, Wall, search
 
 __all__ = ["find_climb"]
 
@@ -139,7 +139,8 @@ class _Finder:
         self._refused = Counter[tuple[str | None, KnotPhase]]()
         self._reasons = dict[tuple[str | None, KnotPhase], str]()
         self._best: _Planned | None = None
-        self._bound, self._proof = np.inf, Found.nothing().proof
+        self._bound = np.inf
+        self._proof: Proof | None = None
         # below one, the hands do not hold the robot at all
         self._floor = 1.0
         self._begun = time.perf_counter()
@@ -352,9 +353,7 @@ class _Finder:
         # the bound may be that of another search, and the certificate is one of this bound
         found = replace(found, bound=self._bound, proof=self._proof)
         wall, best = self._maker.wall, self._best
-        made = partial(
-            FoundClimb, wall=wall, ends=ends, found=found, bound=self._bound, refused=refused
-        )
+        made = partial(FoundClimb, wall=wall, ends=ends, found=found, refused=refused)
         if best is None:
             ended = found.finished and not found.states
             proven = self._bound <= max(self._floor, at_least or 0.0)

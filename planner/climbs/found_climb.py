@@ -39,8 +39,6 @@ class FoundClimb:
         Those of the start and of the goal.
     found : Found
         Answer of the search whose states the climb has; of the last search without a climb.
-    bound : float
-        No climb of the wall has a larger least load factor, by its linear programs.
     least : float or None
         Least load factor of the climb's planned stages; None without a climb, or if a stage has
         none.
@@ -66,7 +64,6 @@ class FoundClimb:
     wall: Wall
     ends: tuple[Ends, Ends]
     found: Found
-    bound: float
     least: float | None = None
     route: Route | None = None
     climb: Climb | None = None
@@ -77,6 +74,11 @@ class FoundClimb:
     refused: tuple[RefusedMoves, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
     compliant: RouteResult | None = None
+
+    @property
+    def bound(self) -> float:
+        """Bound of the search: no climb of the wall has a larger least load factor, by statics."""
+        return self.found.bound
 
     @property
     def gap(self) -> float | None:

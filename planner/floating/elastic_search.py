@@ -222,7 +222,7 @@ def _relaxed(
     for price in prices:
         now, rounds = _descended(hands, goal, point, price, budget, most)
         # after the last, a plan that uses more is better than none
-        growth = math.inf if price is prices[-1] else 1e-3
+        growth = math.inf if price is prices[-1] else SETTINGS.repair_growth
         found, point = made_exact(hands, goal, now, rounds, budget, growth), now.point
         if found.exact or budget.ended or not now.sets.finite:
             break

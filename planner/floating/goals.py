@@ -55,6 +55,7 @@ class FloatingSettings:
 
     With more, these steps would leave the other limits behind."""
     next_corrections: int = 3  # Newton steps of a round, at most; each squares the error
+    repair_growth: float = 1e-3  # of a plan's value by corrections of its last point, relative
     price: float = 2.0
     """Price, as utilisation, of a `WRENCH_UNIT` of missing wrench or a `LOAD_UNIT` of violation."""
     rises: tuple[float, ...] = (1.0, 10.0, 100.0, 1000.0)

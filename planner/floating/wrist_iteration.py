@@ -260,7 +260,7 @@ def made_exact(
     start: WristSolution,
     rounds: int,
     budget: Budget,
-    growth: float = 1e-3,
+    growth: float = SETTINGS.repair_growth,
 ) -> WristSolution:
     """Remove the violations at a point where a search ended without proof, by repeated corrections.
 

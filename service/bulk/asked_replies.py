@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from hashlib import blake2b
 from pathlib import Path
 
 import msgspec
@@ -11,7 +10,7 @@ import msgspec
 from hand_models.base import InvalidInputError
 from service.bulk.headers import Header
 from service.bulk.lines import Asked
-from service.bulk.runs import AnswerOutcome, ReplyLines
+from service.bulk.runs import AnswerOutcome, ReplyLines, question_digest
 
 __all__ = ["AskedReplies"]
 
@@ -44,7 +43,9 @@ class AskedReplies(ReplyLines):
         self, file: Path, header: Header, resume: bool, asked: Asked, named: Mapping[str, str]
     ) -> None:
         about = {"crux": header.crux, "robot_file": header.robot, "explain": header.explain}
-        self._about = {name: _digest(msgspec.json.encode(each)) for name, each in about.items()}
+        self._about = {
+            name: question_digest(msgspec.json.encode(each)) for name, each in about.items()
+        }
         own = {"crux": "version of crux", "robot_file": "--robot", "explain": "--no-explain"}
         self._named = own | dict(named)
         super().__init__(file, False, resume, asked)
@@ -81,8 +82,4 @@ class AskedReplies(ReplyLines):
         fields = msgspec.json.decode(question, type=dict[str, msgspec.Raw])
         if "error" in fields:
             return {}
-        return {name: _digest(bytes(raw)) for name, raw in fields.items()} | self._about
-
-
-def _digest(text: bytes) -> str:
-    return blake2b(text, digest_size=8).hexdigest()
+        return {name: question_digest(bytes(raw)) for name, raw in fields.items()} | self._about

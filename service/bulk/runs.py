@@ -29,7 +29,7 @@ from service.bulk.tally import Tally
 from service.replies import ErrorDetail
 from service.wire import Format, identifier
 
-__all__ = ["AnswerOutcome", "ReplyLines", "Run", "TableLines"]
+__all__ = ["AnswerOutcome", "ReplyLines", "Run", "TableLines", "question_digest"]
 
 
 class AnswerOutcome(NamedTuple):
@@ -366,7 +366,7 @@ class TableLines(Run):
 
     def _line(self, question: bytes, payload: bytes, seconds: float) -> tuple[bytes, AnswerOutcome]:
         row = self.row(payload)
-        line = _RowLine(row.values, row.status, row.error, asked=_digest(question))
+        line = _RowLine(row.values, row.status, row.error, asked=question_digest(question))
         return msgspec.json.encode(line) + b"\n", AnswerOutcome(row.status, row.error, seconds)
 
     def _read_line(self, line: bytes, question: bytes, where: str) -> AnswerOutcome:
@@ -381,7 +381,7 @@ class TableLines(Run):
                 "give another output, or leave out --resume",
                 field="--resume",
             )
-        if row.asked != _digest(question):
+        if row.asked != question_digest(question):
             raise InvalidInputError(
                 f"{where}: the rows answer other requests than those given now; give these again, "
                 "as they were, or start again without --resume",
@@ -390,5 +390,6 @@ class TableLines(Run):
         return AnswerOutcome(row.status, row.error)
 
 
-def _digest(question: bytes) -> str:
+def question_digest(question: bytes) -> str:
+    """Return a digest of a question, or of a part of one."""
     return blake2b(question, digest_size=8).hexdigest()

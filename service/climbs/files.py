@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import msgspec
 
@@ -16,7 +16,17 @@ from service import answering, bulk, replies, requests
 if TYPE_CHECKING:
     from service.answering import SoughtClimb
 
-__all__ = ["write_route", "write_search", "write_stance"]
+__all__ = ["SEARCH_FILES", "write_route", "write_search", "write_stance"]
+
+SEARCH_FILES: Final = {
+    "wall": "wall.npz",
+    "picture of the wall": "wall.png",
+    "rock": "rock.ply",
+    "certificate": "certificate.npz",
+    "route": "route.json",
+    "compliant route": "compliant.json",
+}
+"""Names of the files of a search, of which those are written that there are."""
 
 StageRequest = Callable[
     [planner.RouteStage, Mapping[str, Array] | None, Path], requests.PlanRequest
@@ -82,21 +92,14 @@ def write_search(
     request : ClimbRequest
     sought : SoughtClimb
     folder : Path
-        Existing; files of these names are replaced, and removed where there is none to write.
+        Existing, without files of an earlier search (`ClimbFolder.filling`).
     """
     found, wall = sought.found, sought.made.wall
-    files = {
-        "wall": folder / "wall.npz",
-        "picture of the wall": folder / "wall.png",
-        "rock": folder / "rock.ply",
-        "certificate": folder / "certificate.npz",
-        "route": folder / "route.json",
-        "compliant route": folder / "compliant.json",
-    }
+    files = {name: folder / own for name, own in SEARCH_FILES.items()}
     planner.write_wall(wall, files["wall"], request.name)
     planner.plot_wall(found, sought.rock, sought.rock_pose, files["picture of the wall"])
     if found.found.proof is None:
-        files.pop("certificate").unlink(missing_ok=True)
+        del files["certificate"]
     else:
         planner.climb_certificate(wall, sought.start, sought.goal, found.found).write(
             files["certificate"]
@@ -105,14 +108,14 @@ def write_search(
     routes = {"route": found.route, "compliant route": compliant}
     if found.route is None:
         for name in ("rock", *routes):
-            files.pop(name).unlink(missing_ok=True)
+            del files[name]
         return files
     write_rock(sought.rock.triangles, files["rock"])
     pose = answering.pose_of_request(sought.rock_pose)
     rocks = {"rock": requests.MeshMessage(file=files["rock"].name, pose=pose)}
     for name, route in routes.items():
         if route is None:
-            files.pop(name).unlink(missing_ok=True)
+            del files[name]
             continue
         given = answering.route_request(request, route)
         stance = msgspec.structs.replace(given.stance, rocks=rocks)

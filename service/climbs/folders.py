@@ -15,18 +15,12 @@ from pathlib import Path
 import msgspec
 
 from hand_models.base import InvalidInputError, installed_version, whole_file
+from service.climbs.files import SEARCH_FILES
 
 __all__ = ["ClimbFolder"]
 
 RECORD_NAME = "crux-climb.json"
-SEARCH_NAMES = (
-    "wall.npz",
-    "wall.png",
-    "rock.ply",
-    "certificate.npz",
-    "route.json",
-    "compliant.json",
-)
+SEARCH_NAMES = tuple(SEARCH_FILES.values())
 ROUTE_NAMES = (
     "stages.csv",
     "margin.png",

@@ -5,13 +5,11 @@ For more requests than a list can hold, or for a cluster, use `service.bulk`.
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, without_collection
 from hand_models.parameters import ParameterTable
 from planner import Workers, cores
 from service.bulk import Setting, answered, pool_on, whole_number
@@ -113,7 +111,8 @@ class Planners:
             # what nobody waits for any more
             self._pool.__exit__()
             raise
-        with _no_collection():
+        # the collector would go through all replies again and again
+        with without_collection():
             return [_decoded(answer) for answer in answers]
 
 
@@ -177,18 +176,6 @@ def worth(count: int, workers: int | None = None) -> int:
         return min(whole_number(workers), max(1, count))
     # fewer are planned faster here than in processes that must first start
     return cores() if count >= 500 else 1
-
-
-@contextmanager
-def _no_collection() -> Iterator[None]:
-    """Pause the garbage collector: it would go through all replies again and again."""
-    was = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was:
-            gc.enable()
 
 
 def _decoded(answer: Answer) -> PlanReply | BriefPlanReply | ErrorReply:
