@@ -23,6 +23,7 @@ from .surface import (
     LEAST_SHARE as LEAST_SHARE,
     Surface as Surface,
     engaged_share as engaged_share,
+    preset_strengths as preset_strengths,
     pull_strength as pull_strength,
     surface_names as surface_names,
 )

@@ -43,11 +43,23 @@ from hand_models.base import Array, InvalidInputError
 from hand_models.parameters import ParameterTable, surface_table
 from hand_models.tile.half_planes import HalfPlane, inner_half_planes
 
-__all__ = ["LEAST_SHARE", "Surface", "engaged_share", "pull_strength", "surface_names"]
+__all__ = [
+    "LEAST_SHARE",
+    "Surface",
+    "engaged_share",
+    "preset_strengths",
+    "pull_strength",
+    "surface_names",
+]
 
 LEAST_SHARE: Final = 1e-6
 """Share of a tile's spines that counts as none: far less than one spine, and too little to divide
 loads by."""
+
+SURFACE_BOUNDS: Final = {
+    name: surface_table().scalar("bounds", name) for name in surface_table().sections["bounds"]
+}
+"""Section ``bounds`` of ``surfaces.toml``, in SI units."""
 
 
 @dataclass(frozen=True)
@@ -118,23 +130,23 @@ class Surface:
         check("pull_off_angle", 0.0 < self.pull_off_angle <= math.pi / 2, "be in (0, pi/2] rad")
         for name in ("compression_gain", "shear_scatter", "friction"):
             check(name, getattr(self, name) >= 0.0, "not be negative")
-        most = _bound("lateral_ratio")
+        most = SURFACE_BOUNDS["lateral_ratio"]
         check(
             "lateral_limit",
             self.lateral_limit <= most * self.shear_limit,
             f"be at most {most:g} times {limit}",
             ": spines hold less sideways",
         )
-        most = _bound("scatter_ratio")
+        most = SURFACE_BOUNDS["scatter_ratio"]
         within = self.shear_scatter <= most * self.shear_limit
         check("shear_scatter", within, f"be at most {most:g} times {limit}")
         for name, why in (
             ("compression_gain", "newtons of shear strength for each newton of pressing"),
             ("friction", "newtons of drag for each newton of pull-off"),
         ):
-            most = _bound(name)
+            most = SURFACE_BOUNDS[name]
             check(name, getattr(self, name) <= most, f"be at most {most:g}", f": {why}")
-        most = _bound("pull_off_exponent")
+        most = SURFACE_BOUNDS["pull_off_exponent"]
         check(
             "pull_off_exponent",
             1.0 / most <= self.pull_off_exponent <= most,
@@ -159,7 +171,7 @@ class Surface:
         At the bound (``tile_strength`` of ``parameters/surfaces.toml``) the shafts of all spines
         break.
         """
-        most = _bound("tile_strength")
+        most = SURFACE_BOUNDS["tile_strength"]
         return most if self.shear_limit > most else None
 
     @classmethod
@@ -178,10 +190,6 @@ class Surface:
         InvalidInputError
             If no preset has that name; the message lists the names.
         """
-        if name not in surface_names():
-            raise InvalidInputError(
-                f"unknown surface {name!r}; known are {', '.join(surface_names())}"
-            )
         return _preset(name) if table is None else _from_table(name, table)
 
     @classmethod
@@ -365,18 +373,21 @@ def _by_ratios(shear_limit: float, section: str, table: ParameterTable) -> dict[
     }
 
 
-def _bound(name: str) -> float:
-    """Return a number of section ``bounds`` of ``surfaces.toml``."""
-    return surface_table().scalar("bounds", name)
-
-
 def surface_names() -> tuple[str, ...]:
     """Return the names of the surface presets, for `Surface.named`."""
     no_rock = ("bounds", "defaults")
     return tuple(name for name in surface_table().sections if name not in no_rock)
 
 
+def preset_strengths() -> tuple[float, float]:
+    """Return what a tile holds in shear on the weakest and on the strongest preset [N]."""
+    strengths = [_preset(name).shear_limit for name in surface_names()]
+    return min(strengths), max(strengths)
+
+
 def _from_table(name: str, table: ParameterTable) -> Surface:
+    if name not in surface_names():
+        raise InvalidInputError(f"unknown surface {name!r}; known are {', '.join(surface_names())}")
     numbers = _by_ratios(table.scalar(name, "shear_limit"), name, table)
     return Surface(**numbers, name=name)  # type: ignore[arg-type]
 

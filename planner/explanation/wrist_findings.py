@@ -36,9 +36,8 @@ def palm_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterat
             continue
         shear, pressing = -float(hand.palm.force[0]), float(hand.palm.force[2])
         travel = shear / settled.palm_shear_stiffness
-        gap = max(settled.palm.nearest_gap, 0.0)
-        if pressing < TOLERANCES.palm_pressing:
-            gap = 0.0
+        presses = pressing >= TOLERANCES.palm_pressing
+        gap = max(settled.palm.nearest_gap, 0.0) if presses else 0.0
         lacks = max(travel, gap)
         if lacks > TOLERANCES.palm_travel:
             # alike but for rounding, to a micrometre, the first hand comes first

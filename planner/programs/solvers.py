@@ -49,6 +49,14 @@ __all__ = [
 CAP_SLACK: Final = 1e-6
 """Utilisation by which the tie-break may exceed the least; also the tolerance at a cap."""
 
+_PLANS: Final = bundled_table("plans.toml", "planner.parameters")
+
+GIVEN_AWAY: Final = _PLANS.positive("tension", "given_away")
+"""Part of the least utilisation that a plan may spend for less tension."""
+
+TENSION_WEIGHT: Final = _PLANS.positive("tension", "weight")
+"""Weight w of the sum of squared relative tensions."""
+
 
 class TensionTrade(NamedTuple):
     """Utilisation above the least, u*, that a plan may spend in exchange for less tendon tension.
@@ -93,15 +101,8 @@ def tension_trade(least: float, cap: float) -> TensionTrade:
     TensionTrade
         Weight of the tensions, and bounds of the utilisation.
     """
-    given_away, weight = _tension_numbers()
-    whole = given_away * abs(least)
-    return TensionTrade(weight, least + max(min(whole, cap - least), 0.0), whole)
-
-
-def _tension_numbers() -> tuple[float, float]:
-    """Return the part of the least utilisation that is given away at most, and w."""
-    table = bundled_table("plans.toml", "planner.parameters")
-    return table.positive("tension", "given_away"), table.positive("tension", "weight")
+    whole = GIVEN_AWAY * abs(least)
+    return TensionTrade(TENSION_WEIGHT, least + max(min(whole, cap - least), 0.0), whole)
 
 
 def margin(data: StanceData) -> Outcome:

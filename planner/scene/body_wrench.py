@@ -9,9 +9,8 @@ import numpy as np
 from hand_models.base import Array
 from planner.question import Question
 from planner.result import Finding
-from planner.robots import scene_number
 from planner.scene.scene import SCENE_SETTINGS
-from planner.scene.units import force_unit, robot_findings, unit_finding
+from planner.scene.units import STANDARD_GRAVITY, force_unit, robot_findings, unit_finding
 
 __all__ = ["WrenchCheck", "wrench_findings"]
 
@@ -35,7 +34,7 @@ class WrenchCheck:
         mass = robot.mass if load.mass is None else load.mass
         mass += sum(each.mass for each in load.payloads)
         self._mass, self._weight, self._reach = mass, mass * gravity, robot.reach
-        self._on_earth = robot.mass * scene_number("usual", "standard_gravity")
+        self._on_earth = robot.mass * STANDARD_GRAVITY
         up = stance.body.rotation.T @ -stance.gravity / (gravity or 1.0)
         self._up: tuple[float, ...] = tuple(up.tolist())
         self._known = not any(robot_findings(robot))

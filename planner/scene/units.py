@@ -10,18 +10,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Final
 
 import numpy as np
 
 from hand_models.base import Array
 from hand_models.rock import Cylinder, Edge, Ellipsoid, Hold, Sphere
-from hand_models.tile import Surface, surface_names
+from hand_models.tile import preset_strengths
 from planner.question import Question, Stance
 from planner.result import Finding
 from planner.robots import Robot, scene_number
 from planner.scene.scene import SCENE_SETTINGS
 
-__all__ = ["force_unit", "robot_findings", "unit_finding", "unit_findings"]
+__all__ = ["STANDARD_GRAVITY", "force_unit", "robot_findings", "unit_finding", "unit_findings"]
+
+STANDARD_GRAVITY: Final = scene_number("usual", "standard_gravity")
+"""Acceleration by which a weight is a mass [m/s²]."""
+
+STRONGEST_GRAVITY: Final = scene_number("usual", "strongest_gravity")
+"""Acceleration above that of any planet [m/s²]."""
 
 
 def unit_findings(question: Question) -> tuple[Finding, ...]:
@@ -60,7 +67,7 @@ def force_unit(part: float) -> str | None:
     # is only a tenth of that in N, and has to be nearer
     for unit, newtons, off in (
         ("kN", 1e3, 2.5),
-        ("kgf", scene_number("usual", "standard_gravity"), 1.25),
+        ("kgf", STANDARD_GRAVITY, 1.25),
     ):
         if 1.0 / off <= part * newtons <= off:
             return unit
@@ -70,7 +77,7 @@ def force_unit(part: float) -> str | None:
 def _mass_unit(part: float) -> str | None:
     """Return the unit in which a mass, such a part of the robot's, would be the robot's."""
     for unit, kilograms in (
-        ("N, as a weight", 1.0 / scene_number("usual", "standard_gravity")),
+        ("N, as a weight", 1.0 / STANDARD_GRAVITY),
         ("lb", scene_number("usual", "pound")),
     ):
         if abs(part * kilograms - 1.0) <= SCENE_SETTINGS.unit_factor:
@@ -109,7 +116,7 @@ def _load(question: Question) -> Iterator[Finding]:
                 f"{robot.reach:.2g} m: is it in m, in that frame?"
             )
             yield unit_finding(f"{field}.com", message, away, "m")
-    most = scene_number("usual", "strongest_gravity")
+    most = STRONGEST_GRAVITY
     for name, arm, unit in (
         ("acceleration", 1.0, "m/s²"),
         ("angular_acceleration", robot.reach, "rad/s²"),
@@ -131,7 +138,7 @@ def _odd_mass(field: str, mass: float, robot: Robot) -> Finding:
 
 
 def _gravity(stance: Stance) -> Iterator[Finding]:
-    size, most = float(np.linalg.norm(stance.gravity)), scene_number("usual", "strongest_gravity")
+    size, most = float(np.linalg.norm(stance.gravity)), STRONGEST_GRAVITY
     if abs(size - 1.0) <= 0.02:  # [m/s²]: in g, all but 1
         message = f"it is {size:.3g} m/s², as on no body that is climbed: is it in m/s², or in g?"
         yield unit_finding("stance.gravity", message, size, "m/s²")
@@ -170,7 +177,7 @@ def robot_findings(robot: Robot) -> Iterator[Finding]:
 
 
 def _surfaces(stance: Stance) -> Iterator[Finding]:
-    weakest, strongest = _presets()
+    weakest, strongest = preset_strengths()
     for i, hand in enumerate(stance.hands):
         strength = hand.surface.shear_limit
         # a hand's pull-off is five times the strongest preset's
@@ -183,12 +190,6 @@ def _surfaces(stance: Stance) -> Iterator[Finding]:
         )
         field = f"stance.hands[{i}].surface.shear_limit"
         yield unit_finding(field, message, strength, "N", hand.limb)
-
-
-def _presets() -> tuple[float, float]:
-    """Return what a tile holds in shear on the weakest and on the strongest preset [N]."""
-    strengths = [Surface.named(name).shear_limit for name in surface_names()]
-    return min(strengths), max(strengths)
 
 
 def _holds(stance: Stance) -> Iterator[Finding]:
@@ -285,7 +286,7 @@ def _joints(question: Question) -> Iterator[Finding]:
     if stance.joints is None:
         return
     robot, reported = stance.robot, set()
-    usual = robot.mass * scene_number("usual", "standard_gravity") * robot.reach
+    usual = robot.mass * STANDARD_GRAVITY * robot.reach
     for limb, chain in robot.chains.items():
         given = own.get(limb) if isinstance(own, Mapping) else own
         most = _largest(chain.torque_limits if given is None else given, chain.sliding)

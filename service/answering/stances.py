@@ -240,11 +240,14 @@ def poses_of(messages: Mapping[str, requests.PoseMessage | None]) -> dict[str, P
     """
     found = {}
     for path, pose in messages.items():
-        if pose is not None:
-            with errors_under(path):
-                found[path] = oriented_pose(
-                    pose.position, pose.orientation, pose.rpy, pose.x_axis, pose.z_axis
-                )
+        if pose is None:
+            continue
+        try:
+            found[path] = oriented_pose(
+                pose.position, pose.orientation, pose.rpy, pose.x_axis, pose.z_axis
+            )
+        except InvalidInputError as error:
+            raise error.within(path) from None
     return found
 
 
