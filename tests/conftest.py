@@ -138,6 +138,17 @@ def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Plan every third of the samples of parameters where a spread is asked for."""
+    from planner.question import drawn_hands
+
+    def few(*given, **more):
+        return drawn_hands(*given, **more)[::3]
+
+    monkeypatch.setattr("planner.solving.spread.drawn_hands", few)
+
+
+@pytest.fixture
 def few_changes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Plan 25 changed stances instead of 100 where advice is asked for."""
     from planner.advice import advising

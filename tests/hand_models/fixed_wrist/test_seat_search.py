@@ -77,7 +77,10 @@ def test_the_best_seat_holds_no_less_and_is_as_near_as_it_says(seeds):
     assert more >= len(seeds) / 3
 
 
-@pytest.mark.parametrize(("hold", "rotation"), [(Plane(), 0.0), (Sphere(0.4), math.pi)])
+@pytest.mark.parametrize(
+    ("hold", "rotation"),
+    [(Plane(), 0.0), pytest.param(Sphere(0.4), math.pi, marks=pytest.mark.slow)],
+)
 def test_a_hand_put_where_its_best_seat_is_is_the_same(hold, rotation):
     each = placement(hold, rotation)
     (best,) = best_seats(HAND, [each])

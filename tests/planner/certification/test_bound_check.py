@@ -42,7 +42,7 @@ def open_climb():
 
 
 @pytest.mark.parametrize("sizes", [(5, 2, 0.75), pytest.param((5, 3, 0.7), marks=pytest.mark.slow)])
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(seed=SEEDS, multiple=st.floats(0.1, 4.0))
 def test_agrees_with_exhaustion(sizes, seed, multiple):
     placements, bodies, reach = sizes

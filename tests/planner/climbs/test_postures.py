@@ -158,7 +158,7 @@ def test_limbs_are_apart_where_no_capsules_of_theirs_are_nearer_than_the_margin(
     robot, rng = knob_wall().robot, np.random.default_rng(3)
     names = robot.limbs
     chains = [robot.chains[names[i]] for i in (0, 1)]
-    first, second = (rng.uniform(-np.pi, np.pi, (10, len(c.lower))) for c in chains)
+    first, second = (rng.uniform(-np.pi, np.pi, (6, len(c.lower))) for c in chains)
     for swings, name in ((False, "margin_at_hold"), (True, "margin")):
         found = checks().clearances.apart((0, 1), first, second, swings=swings)
         assert 0 < found.sum() < found.size

@@ -29,7 +29,7 @@ def stepping(first, last):
     ("first", "last"),
     [
         (([0, 1, 2], None), ([6, 7, 8], None)),
-        (([1], (0, 2, 4, 6)), ([7], (1, 2, 5, 6))),
+        pytest.param(([1], (0, 2, 4, 6)), ([7], (1, 2, 5, 6)), marks=pytest.mark.slow),
     ],
 )
 def test_each_state_holds_and_hands_are_where_joints_put_them(first, last):

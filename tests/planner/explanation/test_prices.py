@@ -66,7 +66,7 @@ def test_price_lies_between_the_one_sided_differences():
     for question in QUESTIONS.values():
         answer = plan(question)
         assert answer.prices
-        for price in answer.prices[:8]:
+        for price in answer.prices[:4]:
             more, less = slopes(question, price.name)
             slack = 2e-3 * max(more, less) + 1e-7
             assert more - slack <= price.price <= less + slack

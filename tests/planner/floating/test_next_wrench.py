@@ -72,6 +72,7 @@ def test_a_spent_budget_ends_it():
     assert next_plan(stance.prepared.hands, now, Budget(0)) is None
 
 
+@pytest.mark.slow
 def test_a_known_stance_turns_back_to_a_whole_search_beyond_the_cap():
     stance, question = known("wall-300")
     heavy = 1.3 * stance.prepared.wrench

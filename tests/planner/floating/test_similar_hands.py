@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from hand_models.fixed_wrist import closed_about, scattered_places
 from hand_models.hand import SettledHand
 from planner.deadline import Budget
@@ -16,6 +18,7 @@ PLACES = (9, 46, 8, 29)
 of the given hands no step down to a smaller load ended in a balance."""
 
 
+@pytest.mark.slow
 def test_an_overloaded_stance_near_another_has_a_load_factor() -> None:
     prepared = prepare_stance(complying(questions.question(read_request("overhang"))))
     hand = prepared.question.stance.robot.hand

@@ -84,7 +84,7 @@ def test_capsules_are_as_far_from_each_other_as_coal_says():
 def test_links_are_as_far_from_rock_as_coal_says(hold):
     """Distances are lower bounds, by what the spacing of points leaves out."""
     rng, seen = np.random.default_rng(2), 0
-    angles = np.array([rng.uniform(-1.0, 1.0, 7) for _ in range(60)])
+    angles = np.array([rng.uniform(-1.0, 1.0, 7) for _ in range(30)])
     body = Pose(np.array([-0.7, -0.2, -0.1]), turns_about([0.1, 0.2, 0.3]))
     scene = CollisionScene(ROBOT, [Rock("rock", hold, Pose.identity(), frozenset())])
     space = some_space(scene, {"front_left": angles[0]}, ("front_left",), [body])
@@ -92,14 +92,14 @@ def test_links_are_as_far_from_rock_as_coal_says(hold):
     segments = body.apply(scene.limbs["front_left"].segments(angles).reshape(-1, 3))
     radii = scene.radii[scene.own["front_left"]]
     shape, place = hold_shape(hold)
-    for away, ends in zip(found, segments.reshape(60, -1, 2, 3), strict=True):
+    for away, ends in zip(found, segments.reshape(30, -1, 2, 3), strict=True):
         for near, solid in zip(away, capsule_solids([""] * len(radii), ends, radii), strict=True):
             want, _ = distance_between(solid, solid._replace(shape=shape, place=place))
             # behind triangles coal counts as outside again
             if near > 1e-6 and want < 0.15:
                 seen += 1
                 assert want - 2.5e-3 <= near <= want + 1e-5
-    assert seen > 20
+    assert seen > 10
 
 
 def hold_shape(hold):

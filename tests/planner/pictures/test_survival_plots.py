@@ -33,7 +33,9 @@ def survival(slips: int) -> Survival:
     )
 
 
-@pytest.mark.parametrize("slips", [1, 24, 25, 48])
+@pytest.mark.parametrize(
+    "slips", [24, 25, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 48))]
+)
 def test_the_names_of_a_cascade_stand_apart(slips, tmp_path, monkeypatch):
     figures: list[Figure] = []
     monkeypatch.setattr(survival_plots, "write_picture", lambda f, *_: figures.append(f))

@@ -97,6 +97,7 @@ def test_a_climb_of_one_stage_is_its_stance():
     assert found.holds.all_stages == share
 
 
+@pytest.mark.slow
 def test_processes_find_the_same():
     done: list[tuple[int, int]] = []
     found = find_route_survival(climbed(), FEW, 2, lambda *each: done.append(each))

@@ -39,7 +39,7 @@ def gone_round(at):
     return search(wall, start, goal, blocked=frozenset([pair]))
 
 
-@pytest.mark.parametrize("at", [0, 2, 5])
+@pytest.mark.parametrize("at", [2, *(pytest.param(k, marks=pytest.mark.slow) for k in (0, 5))])
 def test_a_blocked_move_is_gone_round_and_leaves_the_bound(at, monkeypatch):
     """A shift at the start, a lift on the way, and a shift at the goal."""
     climb, factors = climb_and_factors()
@@ -58,6 +58,7 @@ def test_a_blocked_move_is_gone_round_and_leaves_the_bound(at, monkeypatch):
     assert found.bound >= best * (1.0 - 1e-9)
 
 
+@pytest.mark.slow
 def test_moves_that_do_not_pass_are_gone_round_as_blocked_ones_are():
     climb, _ = climb_and_factors()
     _, route = best_route()
@@ -71,6 +72,7 @@ def test_moves_that_do_not_pass_are_gone_round_as_blocked_ones_are():
         assert asked.bound >= around.bound * (1.0 - 1e-9)
 
 
+@pytest.mark.slow
 def test_below_the_floor_nothing_counts_and_above_it_nothing_changes():
     climb, _ = climb_and_factors()
     best, _ = best_route()

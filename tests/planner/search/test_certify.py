@@ -32,7 +32,7 @@ def best_of(climb):
     ("seed", "sizes"),
     [
         (34, {"placements": 5, "bodies": 3, "reach": 0.6}),
-        (4, {"placements": 5, "bodies": 3, "reach": 0.7}),
+        pytest.param(4, {"placements": 5, "bodies": 3, "reach": 0.7}, marks=pytest.mark.slow),
     ],
 )
 def test_of_a_climb_and_its_bound_is_accepted(seed, sizes):

@@ -129,6 +129,7 @@ def test_a_refused_move_gives_the_next_best_climb():
     assert move not in set(zip(around.states[:-2], around.states[2:], strict=True))
 
 
+@pytest.mark.slow
 def test_a_given_start_and_an_early_end():
     wall, start, goal, factors = wall_with_a_climb()
     best = found_on_it()

@@ -15,7 +15,7 @@ from tests.suite.helpers.certificates import (
 )
 
 
-@pytest.mark.parametrize("seed", [0, 7])
+@pytest.mark.parametrize("seed", [7, pytest.param(0, marks=pytest.mark.slow)])
 def test_the_best_climb_may_be_without_a_lift(seed):
     climb = random_climb(seed, placements=5, bodies=3, reach=0.7)
     factors = {state: solved_state(climb, state)[0] for state in every_state(climb)}

@@ -15,7 +15,7 @@ def found(answer: Plan) -> list[Finding]:
     return [each for each in answer.findings if each.kind == "margin_not_had"]
 
 
-@pytest.mark.parametrize("wrist", ["fixed", "compliant"])
+@pytest.mark.parametrize("wrist", ["fixed", pytest.param("compliant", marks=pytest.mark.slow)])
 def test_a_margin_that_costs_the_plan_is_named_with_what_goes_without(wrist: str) -> None:
     answer = plan(limited("wall-300", wrist, hold_margin=5.0))
     bare = plan(limited("wall-300", wrist))

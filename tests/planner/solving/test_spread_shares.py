@@ -41,6 +41,7 @@ def test_shares_are_squared_rank_correlations():
         assert told[name] == pytest.approx(shares[name])
 
 
+@pytest.mark.usefixtures("few_draws")
 @pytest.mark.parametrize(
     ("name", "cap"), [("wall-300", 1.0), ("wall-300", 0.8), pytest.param("ledge", 1.0)]
 )
@@ -58,6 +59,7 @@ def test_the_threshold_is_the_least_rock_that_holds(name, cap):
     assert limit.share == pytest.approx((5.0 - limit.ratio) / 3.0)
 
 
+@pytest.mark.usefixtures("few_draws")
 @pytest.mark.parametrize(("mass", "share"), [(20.0, 1.0), (300.0, 0.0)])
 def test_a_light_robot_holds_on_all_rock_of_the_range_and_a_heavy_one_on_none(mass, share):
     asked = asked_of("wall-300")
@@ -66,6 +68,7 @@ def test_a_light_robot_holds_on_all_rock_of_the_range_and_a_heavy_one_on_none(ma
     assert limit.ratio == (2.0 if share else None)
 
 
+@pytest.mark.usefixtures("few_draws")
 def test_rock_that_is_known_has_no_threshold():
     assert plan(ask(on_wall(surface=TILE_60N), "spread")).spread.threshold is None
     assert plan(ask(on_wall(), "spread", draws=FEW)).spread.threshold is None
@@ -113,6 +116,7 @@ def test_shares_with_the_rock_apart_are_of_the_variance_that_it_leaves():
     assert few.rock_share is None
 
 
+@pytest.mark.usefixtures("few_draws")
 def test_what_was_fitted_is_told_from_what_was_assumed():
     hands = drawn_hands(on_wall().robot.hand, limbs=("front_left",))
     named = drawn_quantities(hands, frozenset(["rock"]))

@@ -32,7 +32,7 @@ def problems(count):
     return found
 
 
-@pytest.fixture(scope="module", params=[4, pytest.param(12, marks=pytest.mark.slow)])
+@pytest.fixture(scope="module", params=[2, pytest.param(12, marks=pytest.mark.slow)])
 def data_of_all(request):
     return problems(request.param)
 

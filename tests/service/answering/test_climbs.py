@@ -161,6 +161,7 @@ def test_knots_come_move_by_move_where_parts_are_asked_for() -> None:
     assert moves == [{k} for k in range(len(moves))]
 
 
+@pytest.mark.slow
 def test_the_best_of_all_refined_searches_is_the_answer(monkeypatch) -> None:
     first, asked = sought(), []
     least = first.found.least

@@ -91,6 +91,7 @@ def test_other_files_are_in_nobodys_way(tmp_path):
     assert contents(tmp_path).items() >= others.items()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("option", "name"), [("ROCK", "rock.ply"), ("--from", "stages/00-start.json")]
 )
@@ -140,6 +141,7 @@ def test_a_climb_that_was_broken_off_while_it_was_written_is_written_again(tmp_p
     assert set(contents(tmp_path)) == {"crux-climb.json"}
 
 
+@pytest.mark.slow
 def test_all_files_of_an_earlier_climb_go_with_it(climbed, tmp_path, capfd):
     folder = tmp_path / "out"
     shutil.copytree(climbed, folder)
@@ -156,6 +158,7 @@ def test_all_files_of_an_earlier_climb_go_with_it(climbed, tmp_path, capfd):
     assert "trajectory.jsonl: No such file" in complaint(capfd)
 
 
+@pytest.mark.slow
 def test_a_trajectory_beside_a_search_that_found_no_climb_is_not_played(climbed, tmp_path, capfd):
     folder = tmp_path / "out"
     shutil.copytree(climbed, folder)

@@ -240,6 +240,7 @@ def test_where_no_hand_comes_to_rest_the_hint_says_so(tmp_path, capfd):
         assert ("--placing given" in told) != rests
 
 
+@pytest.mark.slow
 def test_places_at_holes_of_a_scan_are_counted_with_what_may_close_them(tmp_path, capfd):
     vertices, faces = height_map(np.zeros((121, 121)), 4e-3)
     hole = np.abs(vertices[faces].mean(axis=1)[:, :2] - [0.1, 0.0]).max(axis=1) < 0.03

@@ -65,6 +65,7 @@ def test_advice_that_was_asked_for_is_on_the_page(
     assert all(each["sentence"] in text for each in advice)
 
 
+@pytest.mark.slow
 def test_a_page_of_a_route_needs_no_folder(capfd: pytest.CaptureFixture[str], tmp_path: Path):
     page, route = tmp_path / "route.html", tmp_path / "route.json"
     one_move = msgspec.structs.replace(blocked(), moves=blocked().moves[:1])

@@ -49,6 +49,7 @@ def rows(file: Path) -> list[dict]:
         return [{key: each or None for key, each in row.items()} for row in csv.DictReader(stream)]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("blank_pictures")
 def test_routes_of_a_folder_are_answered_in_order_as_each_is_alone(climbs, tmp_path, capfd):
     file = tmp_path / "routes.jsonl"
@@ -161,6 +162,7 @@ def test_processes_are_ended_and_what_is_whole_is_kept(climbs, tmp_path):
     assert (status, error) == (FAILED, f"crux: interrupted: {kept}\n")
 
 
+@pytest.mark.slow
 def test_routes_are_questions_of_bulk_work_in_processes_too(climbs):
     asked = [read_route(str(climbs / name)) for name in ("a.json", "c.json")]
     here, there = (

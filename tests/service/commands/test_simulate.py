@@ -132,6 +132,7 @@ def test_a_plan_of_least_hazard_says_what_its_probability_counts(capfd, tmp_path
     assert "no tile slips (tiles alone, no common scatter) 0.25" in said
 
 
+@pytest.mark.slow
 def test_few_draws_are_replanned_no_more_often(capfd):
     run_command_line(["simulate", "slab", "--draws", "20", "--strength", "4", "--json"])
     survival = json.loads(capfd.readouterr().out)

@@ -80,6 +80,7 @@ def test_counts_are_by_finger_and_tile(capsys):
     ]
 
 
+@pytest.mark.slow
 def test_a_floating_set_without_zero_shows_least_and_most(capsys, tmp_path):
     request = json.loads(Format.JSON.encode(read_request(STANCE)))
     for hand in request["stance"]["hands"]:
