@@ -93,6 +93,7 @@ from .programs import (
 )
 from .question import (
     EARTH_GRAVITY as EARTH_GRAVITY,
+    MOVING_WRIST_OBJECTIVES as MOVING_WRIST_OBJECTIVES,
     BodyRange as BodyRange,
     ForceCap as ForceCap,
     HandOnHold as HandOnHold,
@@ -106,6 +107,7 @@ from .question import (
     Stance as Stance,
     SurvivalSettings as SurvivalSettings,
     Want as Want,
+    objective_needs as objective_needs,
 )
 from .recovery import (
     Recovered as Recovered,

@@ -8,11 +8,15 @@ from .limits import (
     ForceCap as ForceCap,
     LimbStiffness as LimbStiffness,
     Limits as Limits,
-    Objective as Objective,
     Want as Want,
 )
 from .load import Load as Load, Weights as Weights
 from .lost_tile import LostTile as LostTile
+from .objectives import (
+    MOVING_WRIST_OBJECTIVES as MOVING_WRIST_OBJECTIVES,
+    Objective as Objective,
+    objective_needs as objective_needs,
+)
 from .open_loop import OpenLoopSettings as OpenLoopSettings
 from .question import (
     MOST_DRAWS as MOST_DRAWS,

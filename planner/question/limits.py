@@ -1,4 +1,4 @@
-"""Limits of a question: caps on a plan, ranges of an advice, and names of objectives and extras.
+"""Limits of a question: caps on a plan, ranges of an advice, and names of extras.
 
 They are msgspec structs without numpy arrays, so that they can be sent as they are.
 """
@@ -20,12 +20,9 @@ __all__ = [
     "LimbStiffness",
     "Limits",
     "Margins",
-    "Objective",
     "Want",
     "no_torque",
 ]
-
-Objective = Literal["max_margin", "min_effort", "max_reliability", "max_robust"]
 
 Want = Literal[
     "load_factor", "prices", "model", "robust", "open_loop", "spread", "clearance", "advice"

@@ -18,14 +18,14 @@ from hand_models.base import (
 from hand_models.hand import FINGERS
 from hand_models.parameters import ParameterSample, bundled_table
 from planner.question.draws import drawn_hands
-from planner.question.limits import (
-    BodyRange,
-    Limits,
-    Objective,
-    Want,
-    no_torque,
-)
+from planner.question.limits import BodyRange, Limits, Want, no_torque
 from planner.question.load import Load, Weights
+from planner.question.objectives import (
+    MOVING_WRIST_OBJECTIVES,
+    OBJECTIVE_NEEDS,
+    Objective,
+    ObjectiveNeeds,
+)
 from planner.question.open_loop import OpenLoopSettings
 from planner.question.stance import Stance, checked_body_wrench, known_choice, known_limbs
 
@@ -154,17 +154,17 @@ class Question:
 
     def _check_fixed_objectives(self) -> None:
         moving = [hand.limb for hand in self.stance.hands if hand.wrist != "fixed"]
-        if moving and self.objective in ("max_reliability", "max_robust"):
+        if moving and self.needs.fixed_wrists:
             raise UnsupportedError(
-                f"{self.objective} requires fixed wrists on all hands, as tiles' loads are not "
-                f"convex in a wrist's pose; others have {', '.join(moving)}: fix these, or ask for "
-                "max_margin or min_effort",
+                f"{self.objective_name} requires fixed wrists on all hands, as tiles' loads are "
+                f"not convex in a wrist's pose; others have {', '.join(moving)}: fix these, or ask "
+                f"for {' or '.join(MOVING_WRIST_OBJECTIVES)}",
                 field="objective",
             )
 
     def _check_reliability(self) -> None:
         tolerance = self.tolerance
-        if self.objective != "max_reliability":
+        if not self.needs.scatter:
             if tolerance is not None:
                 raise InvalidInputError(
                     "requires the objective 'max_reliability'; ask for it, or remove tolerance",
@@ -189,6 +189,16 @@ class Question:
                 )
 
     @property
+    def objective_name(self) -> str:
+        """Name of the objective."""
+        return self.objective if isinstance(self.objective, str) else self.objective.name
+
+    @property
+    def needs(self) -> ObjectiveNeeds:
+        """Needs of the objective."""
+        return OBJECTIVE_NEEDS.get(self.objective_name) or ObjectiveNeeds()
+
+    @property
     def utilisation_tolerance(self) -> float:
         """Part of the least utilisation by which a plan of 'max_reliability' may exceed it."""
         if self.tolerance is not None:
@@ -197,7 +207,7 @@ class Question:
         return table.positive("reliability", "tolerance")
 
     def _check_draws(self) -> None:
-        if "spread" not in self.want and self.objective != "max_robust":
+        if "spread" not in self.want and not self.needs.samples:
             if self.draws is not None:
                 raise InvalidInputError(
                     "requires 'spread' in want; add 'spread', or remove draws", field="draws"

@@ -26,7 +26,7 @@ from planner.motion import (
 )
 from planner.prepare import posture
 from planner.programs import CAP_SLACK
-from planner.question import HandOnHold, Objective
+from planner.question import HandOnHold, Objective, objective_needs
 from planner.robots import UnreachableError, solve_limbs
 from planner.route.between import Passage
 from planner.route.branch_choice import ends_of_swing, start_joints, swing_to
@@ -304,16 +304,15 @@ class _Planner:
     def _plan(self, posed: Posed, *, stage: bool = False) -> HeldPosture:
         """Return the plan of a posture; between stages palms press, so that they can settle.
 
-        Plans of least effort, and those that serve samples best, may use all of the cap, and leave
-        no room on the way; between stages the margin is the largest in their place.
+        Plans that may use all of the cap leave no room on the way; between stages the margin is
+        the largest in their place.
         """
-        press, objective = self._numbers.press, self._route.objective
-        wide: Objective | None = None
-        if not stage and objective in ("min_effort", "max_robust"):
-            wide = "max_margin"
+        press = self._numbers.press
+        wide = objective_needs(self._route.objective).whole_cap and not stage
+        objective: Objective | None = "max_margin" if wide else None
         for least in (0.0,) if stage else (press, 0.25 * press, 0.0):
             try:
-                held = hold_as_planned(posed, self._near, least, wide)
+                held = hold_as_planned(posed, self._near, least, objective)
             except NoPlanError:
                 if not least:
                     raise

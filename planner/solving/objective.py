@@ -21,6 +21,7 @@ from planner.explanation import ActiveLimits
 from planner.floating import Goal, LeastEffort
 from planner.prepare import PreparedStance, Sets
 from planner.programs import Outcome, StanceData, convex_bound
+from planner.question import MOVING_WRIST_OBJECTIVES
 from planner.result import PlanArrays
 
 __all__ = ["MAX_MARGIN", "CappedObjective", "MaxMargin", "MinEffort", "Objective"]
@@ -180,7 +181,7 @@ class CappedObjective(Objective):
         """
         raise UnsupportedError(
             f"{self.name} requires fixed wrists on all hands; with a compliant or floating wrist, "
-            f"valid are {MaxMargin.name}, {MinEffort.name}",
+            f"valid are {', '.join(MOVING_WRIST_OBJECTIVES)}",
             field="objective",
         )
 

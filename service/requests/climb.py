@@ -8,7 +8,7 @@ from msgspec import Meta, field
 
 from hand_models.base import Coordinate, InvalidFieldError, Name, Position, Strict
 from hand_models.hand import Grasp, WristTravel
-from planner import BodyGrid, Limits, PlaceGrid
+from planner import MOVING_WRIST_OBJECTIVES, BodyGrid, Limits, PlaceGrid
 from service.requests.holds import MeshMessage, SurfaceMessage
 from service.requests.questions import ObjectiveName
 from service.requests.request import (
@@ -158,9 +158,10 @@ class ClimbRequest(Query, frozen=True, kw_only=True):
     parts: InParts = False
 
     def __post_init__(self) -> None:
-        if self.wrist == "compliant" and self.objective not in ("max_margin", "min_effort"):
+        if self.wrist == "compliant" and self.objective not in MOVING_WRIST_OBJECTIVES:
+            valid = " or ".join(MOVING_WRIST_OBJECTIVES)
             raise InvalidFieldError(
-                f"'compliant' requires objective max_margin or min_effort, got {self.objective!r}",
+                f"'compliant' requires objective {valid}, got {self.objective!r}",
                 field="wrist",
             )
         if self.wrist_travel is not None and self.wrist != "compliant":

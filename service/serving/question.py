@@ -10,6 +10,7 @@ import msgspec
 import zenoh
 
 from hand_models.base import CruxError, LimitError
+from planner import objective_needs
 from service.answering import SERVICES_BY_NAME
 from service.processes import Job
 from service.publishing import PublishedWrench
@@ -250,8 +251,8 @@ def _read(question: PendingQuestion) -> None:
     # these take many plans
     extras = {"robust", "open_loop", "spread", "advice", "survival"}
     many = isinstance(want, list) and any(each in want for each in extras)
-    unread = _is_long(head.want)
-    question.dear = question.dear or many or unread or objective == "max_robust"
+    many = many or (isinstance(objective, str) and objective_needs(objective).samples)
+    question.dear = question.dear or many or _is_long(head.want)
     most = _value(head.max_reply_bytes, question.form)
     if isinstance(most, int) and most >= LEAST_REPLY_BYTES:
         question.most = min(most, LARGEST_ERROR)

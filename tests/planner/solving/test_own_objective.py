@@ -1,6 +1,7 @@
 """An objective that is defined here, from its program to what a plan says of it."""
 
 from dataclasses import replace
+from typing import get_args
 
 import cvxpy as cp
 import numpy as np
@@ -11,7 +12,8 @@ from hand_models.base import InvalidInputError, UnsupportedError
 from planner.programs import CAP_SLACK
 from planner.programs.conic import ConicProgram
 from planner.programs.stance_program import Definition, StanceProgram
-from planner.question import Limits, Load
+from planner.question import MOVING_WRIST_OBJECTIVES, Limits, Load, Objective
+from planner.question.objectives import OBJECTIVE_NEEDS
 from planner.solving import NAMED_OBJECTIVES, CappedObjective, plan
 from planner.streaming import WrenchStream
 from tests.suite.helpers.stances import ask, on_wall, program_data
@@ -118,3 +120,17 @@ def test_what_it_does_not_do_is_refused_by_name():
         with pytest.raises(InvalidInputError) as caught:
             replace(QUESTION, objective=wrong)
         assert caught.value.field == "objective"
+
+
+def test_a_named_objective_and_its_object_need_the_same():
+    assert set(get_args(Objective)) == set(NAMED_OBJECTIVES) == set(OBJECTIVE_NEEDS)
+    first, *others = QUESTION.stance.hands
+    hands = replace(first, wrist="compliant"), *others
+    moving = replace(QUESTION, stance=replace(QUESTION.stance, hands=hands))
+    for name, objective in NAMED_OBJECTIVES.items():
+        for asked in (name, objective):
+            if name in MOVING_WRIST_OBJECTIVES:
+                assert replace(moving, objective=asked).objective_name == name
+                continue
+            with pytest.raises(UnsupportedError, match=f"{name} requires fixed wrists"):
+                replace(moving, objective=asked)
