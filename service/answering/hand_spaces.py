@@ -205,8 +205,14 @@ def _opening(path: HandPath, retreat: float | None) -> replies.OpeningReply:
                 *(each.tolist() for each in columns), strict=True
             )
         ],
-        events=[replies.TileEventReply(**each._asdict()) for each in path.events],
-        jammed=[replies.JamReply(**each._asdict()) for each in path.jammed],
+        events=[
+            replies.TileEventReply(finger=each.finger, phalanx=each.phalanx, tension=each.tension)
+            for each in path.events
+        ],
+        jammed=[
+            replies.JamReply(finger=each.finger, friction=each.friction, reason=each.reason)
+            for each in path.jammed
+        ],
         resting=list(path.resting),
         friction=path.friction,
         retreat=retreat,

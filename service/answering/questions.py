@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from msgspec import UNSET, structs
@@ -154,7 +154,7 @@ def route_request(asked: requests.ClimbRequest, route: Route) -> requests.RouteR
         gravity=_vector(start.gravity),
         body=pose_of_request(start.body),
         joints=joints if joints is None or isinstance(joints, str) else _lists(joints),
-        hands=[requests.Hand(**_hand_fields(asked, hand)) for hand in start.hands],
+        hands=[_hand(asked, hand) for hand in start.hands],
     )
     return requests.RouteRequest(
         v=1,
@@ -164,7 +164,7 @@ def route_request(asked: requests.ClimbRequest, route: Route) -> requests.RouteR
         limits=route.limits,
         moves=[
             requests.MoveMessage(
-                **_hand_fields(asked, move.hand),
+                **structs.asdict(_hand(asked, move.hand)),
                 body=None if move.body is None else pose_of_request(move.body),
                 joints="solve" if isinstance(move.joints, str) else _lists(move.joints),
             )
@@ -175,14 +175,18 @@ def route_request(asked: requests.ClimbRequest, route: Route) -> requests.RouteR
     )
 
 
-def _hand_fields(asked: requests.ClimbRequest, hand: HandOnHold) -> dict[str, Any]:
-    """Return the fields of a hand of a request that is on the climb's rock."""
+def _hand(asked: requests.ClimbRequest, hand: HandOnHold) -> requests.Hand:
+    """Return a hand of a request that is on the climb's rock."""
     assert hand.hold_in_hand is not None
-    hold = requests.RockReference(rock="rock", pose_in_hand=pose_of_request(hand.hold_in_hand))
-    surface, grasp = asked.surface, hand.grasp
-    own = {"limb": hand.limb, "pose": pose_of_request(hand.pose), "hold": hold}
-    wrist = {"wrist": hand.wrist, "wrist_travel": hand.wrist_travel}
-    return own | {"surface": surface, "grasp": grasp} | wrist
+    return requests.Hand(
+        limb=hand.limb,
+        pose=pose_of_request(hand.pose),
+        hold=requests.RockReference(rock="rock", pose_in_hand=pose_of_request(hand.hold_in_hand)),
+        surface=asked.surface,
+        grasp=hand.grasp,
+        wrist=hand.wrist,
+        wrist_travel=hand.wrist_travel,
+    )
 
 
 def pose_of_request(pose: Pose) -> requests.PoseMessage:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
-from msgspec.structs import asdict
 
 import planner
-from hand_models.base import InvalidInputError, errors_under
+from hand_models.base import Array, InvalidInputError, errors_under
 from planner import Plan
 from service.answering.answers import placed_poses
 from service.answering.own_models import BUNDLED_ROBOTS, Robots
@@ -100,20 +101,30 @@ def answer_diagnosis(request: DiagnosisRequest, robots: Robots = BUNDLED_ROBOTS)
             f"there is no plan from which a tile could have slipped: {plan.reason}", field="stance"
         )
     diagnosis = planner.SlipDiagnosis(planner.prepare_stance(asked), plan.hands)
-    data = {
-        kind: {limb: np.array(own) for limb, own in getattr(request, kind).items()}
-        for kind in ("tensions", "currents", "turns")
-    }
-    found = diagnosis.diagnose(**data)
+    found = diagnosis.diagnose(
+        tensions=_arrays(request.tensions),
+        currents=_arrays(request.currents),
+        turns=_arrays(request.turns),
+    )
     return DiagnosisReply(
         id=request.id,
         poses=placed_poses(asked.stance),
         seen=found.seen,
         tiles=[
-            SuspectReply(**asdict(each.tile), probability=each.probability, expected=each.expected)
+            SuspectReply(
+                limb=each.tile.limb,
+                finger=each.tile.finger,
+                phalanx=each.tile.phalanx,
+                probability=each.probability,
+                expected=each.expected,
+            )
             for each in found.tiles
         ],
         suspects=list(found.suspects),
         ambiguous=[list(pair) for pair in diagnosis.ambiguous(held=not request.turns)],
         reason=found.reason,
     )
+
+
+def _arrays(data: Mapping[str, Sequence[float]]) -> dict[str, Array]:
+    return {limb: np.array(own) for limb, own in data.items()}

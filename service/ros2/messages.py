@@ -25,6 +25,7 @@ from service.replies import (
     Vector,
     WrenchSpaceReply,
 )
+from service.requests import SetPointsRequest
 from service.ros2.definitions import RosTypes
 from service.ros2.health import DiagnosticState
 from service.wire import Format, MalformedError, ServiceName
@@ -69,15 +70,14 @@ class RosMessages:
         if name is not ServiceName.SET_POINTS:
             asked: str = request.request
             return asked.encode()
-        named = ("limb", "finger", "phalanx")
-        question = {
-            "v": 1,
-            "stream": request.stream,
-            "body_wrench": wrench_entries(request.body_wrench),
-            "detail": "set_points",
-            "lost": [{part: getattr(tile, part) for part in named} for tile in request.lost],
-            "deadline": request.deadline or None,
-        }
+        question = SetPointsRequest(
+            v=1,
+            stream=request.stream,
+            body_wrench=wrench_entries(request.body_wrench),
+            detail="set_points",
+            lost=[LostTile(tile.limb, tile.finger, tile.phalanx) for tile in request.lost],
+            deadline=request.deadline or None,
+        )
         return msgspec.json.encode(question)
 
     def response(self, kind: str, reply: AnyReply, text: str) -> Any:
@@ -247,10 +247,10 @@ class RosMessages:
         )
 
 
-def wrench_entries(wrench: Any) -> list[float]:
+def wrench_entries(wrench: Any) -> tuple[float, float, float, float, float, float]:
     """Return ``geometry_msgs/msg/Wrench`` as six entries."""
-    parts = (wrench.force, wrench.torque)
-    return [float(getattr(part, axis)) for part in parts for axis in "xyz"]
+    force, moment = wrench.force, wrench.torque
+    return force.x, force.y, force.z, moment.x, moment.y, moment.z
 
 
 def number(value: float | None) -> float:

@@ -121,7 +121,7 @@ class RosStream:
             v=1,
             number=number,
             time=1e-9 * number,
-            body_wrench=tuple(wrench_entries(given.wrench)),  # type: ignore[arg-type]
+            body_wrench=wrench_entries(given.wrench),
             detail="hands",
         )
         self._session.put(

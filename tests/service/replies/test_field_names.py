@@ -15,18 +15,29 @@ ROOT = Path(__file__).parents[3]
 CHECKED = (
     "planner/explanation/certificate.py",
     "service/answering/answers.py",
+    "service/answering/climbs.py",
+    "service/answering/hand_spaces.py",
     "service/answering/questions.py",
+    "service/answering/slips.py",
     "service/answering/stances.py",
+    "service/answering/streams.py",
 )
 """The modules in which the planner's values and messages are made and meet."""
 
 RENAMED = {
+    "hand_models/opening/hand_path.py": "jammed",
+    "planner/climbs/found_climb.py": "refused",
+    "planner/diagnosis/slip_diagnosis.py": "suspects",
+    "planner/route/knots.py": "joint_torque",
     "planner/result/plan.py": "joint_torque_limit",
     "planner/result/certificate.py": "irreducible_up_to",
+    "service/replies/opening.py": "phalanx",
     "service/replies/reply.py": "backed_off",
+    "service/requests/questions.py": "currents",
     "service/requests/stance.py": "seat_direction",
 }
-"""Where a field is declared, and which: of the planner, of both, of a reply, of a request."""
+"""Where a field is declared, and which: of a hand, of the planner, of both, of a reply, of a
+request."""
 
 
 def errors(folder: Path) -> str:
