@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,9 @@ from hand_models.base import Array, InvalidInputError, Pose
 from hand_models.parameters import scan_table
 from hand_models.rock.surface import Triangles, grid
 from hand_models.sections import FingerRock, FingerSize, Section, Swept
+
+if TYPE_CHECKING:
+    from hand_models.rock.triangles import TriangleCells
 
 __all__ = ["Hold"]
 
@@ -30,6 +33,9 @@ class Hold(ABC):
 
     nbytes = 0
     """Memory that the hold's data takes [bytes]; 0 for a shape of a few numbers."""
+
+    cells: TriangleCells | None = None
+    """Index of a mesh's own triangles; None for other holds."""
 
     @property
     def border(self) -> Array:

@@ -70,6 +70,7 @@ class Mesh(OutlinedHold):
     """
 
     shape = "mesh"
+    cells: TriangleCells
 
     def __init__(
         self,

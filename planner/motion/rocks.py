@@ -9,7 +9,7 @@ import numpy as np
 
 from hand_models.base import Array, Pose, stored
 from hand_models.hand import SettledHand
-from hand_models.rock import Hold, Mesh, TriangleCells
+from hand_models.rock import Hold, TriangleCells
 from planner.question import HandOnHold
 from planner.scene import SCENE_SETTINGS, smooth_depths
 
@@ -72,7 +72,7 @@ def distances_from_rock(hold: Hold, points: Array, most: float) -> Array:
     """
     if hold.swept is not None:
         return np.asarray(-smooth_depths([hold.swept], points[None])[0])
-    cells = hold.cells if isinstance(hold, Mesh) else _cells(hold)
+    cells = _cells(hold) if hold.cells is None else hold.cells
     return cells.distances(points, most)
 
 
