@@ -49,8 +49,9 @@ __all__ = [
 ObjectiveName = Annotated[
     Objective,
     Meta(
-        description="least utilisation; least effort within limits.utilisation; or largest "
-        "probability that no tile slips, at nearly the least utilisation"
+        description="least utilisation; least effort within limits.utilisation; largest "
+        "probability that no tile slips, at nearly the least utilisation; or least mean "
+        "utilisation over samples, with the same tensions"
     ),
 ]
 Explain = Annotated[
