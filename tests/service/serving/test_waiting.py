@@ -355,11 +355,18 @@ def taken_of(payload: bytes, encoding: str, attached: bytes | None = None) -> Pe
 
 
 @pytest.mark.parametrize(
-    ("want", "dear"), [("load_factor", False), ("robust", True), ("spread", True)]
+    ("head", "dear"),
+    [
+        ('"want": ["prices", "load_factor"]', False),
+        ('"want": ["prices", "robust"]', True),
+        ('"want": ["prices", "spread"]', True),
+        ('"objective": "min_effort"', False),
+        ('"objective": "max_robust"', True),
+        ('"objective": ["max_robust"]', False),
+    ],
 )
-def test_what_takes_many_plans_is_known_by_its_head(want: str, dear: bool):
-    payload = f'{{"want": ["prices", "{want}"]}}'.encode()
-    assert taken_of(payload, "application/json").dear == dear
+def test_what_takes_many_plans_is_known_by_its_head(head: str, dear: bool):
+    assert taken_of(f"{{{head}}}".encode(), "application/json").dear == dear
 
 
 @pytest.mark.parametrize(
