@@ -17,6 +17,8 @@ from hand_models.finger import (
     close_all,
     settle_finger,
 )
+from hand_models.finger.contact_states import _over
+from hand_models.finger.path_state import SETTINGS_RECORD, drives
 from hand_models.hand.tightening import resting_tensions
 from hand_models.rock import Profile
 from hand_models.sections import Disc, FingerRock, FlatRock, PolylineSection
@@ -46,6 +48,21 @@ def kinds(closed):
 def close_one(*opened, model=MODEL):
     (closed,) = close_all(model, [OpenFinger(FingerRock(opened[0]), *opened[1:])])
     return closed
+
+
+@pytest.mark.parametrize("exponent", [0.5, 1.0, 2.0])
+def test_spines_let_go_where_the_declared_law_of_their_tile_ends(exponent):
+    surface = replace(ROCK, pull_off_exponent=exponent, friction=0.0)
+    (drive,) = drives(MODEL, [OpenFinger(FingerRock(FlatRock(1j, H)), surface, 37.0)])
+    drive["lowers"] = 1
+    for angle in np.linspace(0.05, math.pi / 2, 12):
+        for share in (1.0, 0.3):
+            most = share * float(surface.strength(angle))
+            for size, holds in ((0.999, True), (1.001, False)):
+                load = size * most
+                loads = share, load * math.cos(angle), -load * math.sin(angle)
+                over = _over(SETTINGS_RECORD[0], drive, 0, *loads)
+                assert (over <= 0.0) == holds, (angle, share)
 
 
 # Everywhere ---------------------------------------------------------------------------------------
