@@ -12,6 +12,7 @@ from planner import DecidingStage, LimitName
 from service import replies, requests
 from service.bulk import Column, chunks, climb_columns, columns_of, route_columns
 from service.bulk.runs import _Reply
+from service.climbs.naming import FIELD_OPTIONS
 from service.publishing import published_wrenches
 from service.recording.replaying import _Asks
 from service.ros2 import markers
@@ -45,6 +46,10 @@ def test_a_head_has_fields_of_its_message(
     part: type[Struct], wholes: tuple[type[Struct], ...]
 ) -> None:
     assert names(part) <= names(*wholes)
+
+
+def test_an_option_of_a_climb_stands_for_a_field_of_its_request() -> None:
+    assert FIELD_OPTIONS.keys() <= names(requests.ClimbRequest)
 
 
 MADE = {"index", "moves", "hardest", "irreducible", "sufficient"}
