@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -52,6 +53,11 @@ class Hold(ABC):
     def outline(self) -> Array:
         """Edges of the border that go around no hole of the known rock, shape (n, 2, 3) [m]."""
         return self.border
+
+    @property
+    def largest_sizes(self) -> Mapping[str, float]:
+        """Largest length of each field that gives the hold a size, by the field's name [m]."""
+        return {}
 
     @property
     def oddities(self) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
@@ -147,6 +148,10 @@ class Cylinder(SweptHold):
         _check_size(self.diameter, "diameter")
 
     @property
+    def largest_sizes(self) -> Mapping[str, float]:
+        return {"diameter": self.diameter}
+
+    @property
     def swept(self) -> Swept:
         radius = self.diameter / 2.0
         return Swept(1.0, 0.0, 1.0, radius, radius)
@@ -177,6 +182,10 @@ class Edge(SweptHold):
             raise InvalidInputError(f"must be in (0, pi) rad, got {self.angle:g}", field="angle")
 
     @property
+    def largest_sizes(self) -> Mapping[str, float]:
+        return {"fillet_radius": self.fillet_radius}
+
+    @property
     def swept(self) -> Swept:
         radius, half = self.fillet_radius, self.angle / 2.0
         return Swept(1.0, 0.0, 1.0, radius, radius, math.sin(half), math.cos(half))
@@ -200,6 +209,10 @@ class Sphere(SweptHold):
 
     def __post_init__(self) -> None:
         _check_size(self.diameter, "diameter")
+
+    @property
+    def largest_sizes(self) -> Mapping[str, float]:
+        return {"diameter": self.diameter}
 
     @property
     def swept(self) -> Swept:
@@ -232,6 +245,10 @@ class Ellipsoid(SweptHold):
             )
         for i, value in enumerate(self.semi_axes):
             _check_size(value, f"semi_axes[{i}]")
+
+    @property
+    def largest_sizes(self) -> Mapping[str, float]:
+        return {"semi_axes": max(self.semi_axes)}
 
     @property
     def swept(self) -> Swept:

@@ -15,7 +15,6 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import Array
-from hand_models.rock import Cylinder, Edge, Ellipsoid, Hold, Sphere
 from hand_models.tile import preset_strengths
 from planner.question import Question, Stance
 from planner.result import Finding
@@ -195,22 +194,14 @@ def _surfaces(stance: Stance) -> Iterator[Finding]:
 def _holds(stance: Stance) -> Iterator[Finding]:
     most = SCENE_SETTINGS.widest * stance.robot.reach
     for i, hand in enumerate(stance.hands):
-        name, size = _width(hand.hold)
-        if size > most:
-            message = (
-                f"the hold's {name} is {size:.3g} m, and limbs reach "
-                f"{stance.robot.reach:.2g} m: is it in m?"
-            )
-            yield unit_finding(f"stance.hands[{i}].hold.{name}", message, size, "m", hand.limb)
-
-
-def _width(hold: Hold) -> tuple[str, float]:
-    """Return the largest length of a hold of a plain shape, and its name; else nothing."""
-    if isinstance(hold, Cylinder | Sphere):
-        return "diameter", hold.diameter
-    if isinstance(hold, Ellipsoid):
-        return "semi_axes", max(hold.semi_axes)
-    return ("fillet_radius", hold.fillet_radius) if isinstance(hold, Edge) else ("", 0.0)
+        for name, size in hand.hold.largest_sizes.items():
+            if size > most:
+                message = (
+                    f"the hold's {name} is {size:.3g} m, and limbs reach "
+                    f"{stance.robot.reach:.2g} m: is it in m?"
+                )
+                field = f"stance.hands[{i}].hold.{name}"
+                yield unit_finding(field, message, size, "m", hand.limb)
 
 
 # What is carried ----------------------------------------------------------------------------------

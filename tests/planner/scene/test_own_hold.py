@@ -15,7 +15,7 @@ from planner.pictures.plan_scene import drawn_scene
 from planner.prepare.settled_stance import settle_stance
 from planner.question import Load, Question
 from planner.robots import robosimian
-from planner.scene import clearance, scene_of
+from planner.scene import clearance, scene_of, unit_findings
 from planner.solving import plan
 from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.stances import on_wall
@@ -71,6 +71,10 @@ class FlatLog(SweptHold):
     width: float = 0.36
     thickness: float = 0.3
     shape = "flat_log"
+
+    @property
+    def largest_sizes(self):
+        return {"width": self.width, "thickness": self.thickness}
 
     @property
     def swept(self):
@@ -146,3 +150,12 @@ def test_limbs_are_kept_clear_of_it(hold):
     assert (max(in_rock) > 0.0) == (near.distance < 0.0)
     if near.distance > 0.0:
         assert near.distance <= -max(in_rock) * 1.5 + 1e-3
+
+
+def test_its_sizes_are_held_against_the_reach_of_the_limbs():
+    question = Question(on_wall(FlatLog(360.0, 300.0), limbs=("front_left",)), load=Load())
+    assert [each.field for each in unit_findings(question)] == [
+        "stance.hands[0].hold.width",
+        "stance.hands[0].hold.thickness",
+    ]
+    assert unit_findings(Question(on_wall(FlatLog(), limbs=("front_left",)), load=Load())) == ()

@@ -308,6 +308,32 @@ def test_a_service_whose_processes_do_not_start_says_so(alone: zenoh.Session) ->
         pass
 
 
+UNGUARDED = """
+import zenoh
+from service.serving import PlanService
+from tests.suite.helpers.served import lonely_session
+with lonely_session() as alone, PlanService(alone, workers=1):
+    print("ready")
+"""
+
+
+@pytest.mark.slow
+def test_a_program_without_its_guard_ends_with_what_it_lacks(tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(UNGUARDED)
+    done = subprocess.run(
+        [sys.executable, str(program)],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "if __name__ == '__main__':" in done.stderr
+    assert "LostError: none of the 1 workers started" in done.stderr
+
+
 @pytest.mark.parametrize(
     ("settings", "field"), [({"workers": 0}, "workers"), ({"seconds": 0.0}, "seconds")]
 )
