@@ -69,6 +69,8 @@ from .orientations import (
 from .pictures import (
     COLOUR_OF as COLOUR_OF,
     SERIES_COLOURS as SERIES_COLOURS,
+    draw_arrow as draw_arrow,
+    panel_grid as panel_grid,
     write_picture as write_picture,
 )
 from .roots import root_between as root_between

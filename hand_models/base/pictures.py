@@ -10,7 +10,7 @@ from hand_models.base.files import whole_file
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COLOUR_OF", "SERIES_COLOURS", "write_picture"]
+__all__ = ["COLOUR_OF", "SERIES_COLOURS", "draw_arrow", "panel_grid", "write_picture"]
 
 COLOUR_OF: Final = {
     "blue": "#11366f",
@@ -30,6 +30,53 @@ SERIES_COLOURS: Final = tuple(
     COLOUR_OF[name] for name in ("blue", "red", "green", "sky", "purple", "amber")
 )
 """Colours of curves beside each other, the first of them the farthest apart."""
+
+
+def panel_grid(
+    count: int, columns: int, size: tuple[float, float], **options: Any
+) -> tuple[Figure, list[Any]]:
+    """Return a figure with a number of axes in rows; the last row may have fewer.
+
+    Parameters
+    ----------
+    count, columns : int
+        Numbers of axes, and of axes in a row.
+    size : tuple of float
+        Width and height of the figure [inches].
+    **options
+        Of matplotlib's ``Figure.subplots``.
+
+    Returns
+    -------
+    tuple of (Figure, list of Axes)
+        The axes row by row.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    panels = figure.subplots(-(-count // columns), columns, squeeze=False, **options).ravel()
+    for axes in panels[count:]:
+        axes.remove()
+    return figure, panels[:count].tolist()
+
+
+def draw_arrow(axes: Any, start: Any, tip: Any, colour: Any, **style: Any) -> None:
+    """Draw an arrow from a point to another, as a note without text.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes to draw into; their limits do not change.
+    start, tip : array_like, shape (2,)
+        Ends of the arrow, in the coordinates of the axes.
+    colour : colour of matplotlib
+    **style
+        Of matplotlib's ``FancyArrowPatch``.
+    """
+    ends = {"shrinkA": 0.0, "shrinkB": 0.0} | style
+    axes.annotate(
+        "", tuple(tip), tuple(start), arrowprops={"arrowstyle": "-|>", "color": colour, **ends}
+    )
 
 
 def write_picture(figure: Figure, path: Path, dpi: float = 150.0, **options: Any) -> None:

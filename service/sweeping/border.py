@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Final, NamedTuple
 
 import msgspec
+import numpy as np
 
 from service.sweeping.design import Design
 from service.sweeping.rows import SweepRow
@@ -188,13 +189,10 @@ def crossing(holds: SweepRow, fails: SweepRow, place: int) -> float | None:
     """
     if holds.margin is None or fails.margin is None or not fails.margin > holds.margin:
         return None
-    share = (1.0 - holds.margin) / (fails.margin - holds.margin)
-    start = at(holds, place)
-    return start + min(max(share, 0.0), 1.0) * (at(fails, place) - start)
+    ends = at(holds, place), at(fails, place)
+    return float(np.interp(1.0, (holds.margin, fails.margin), ends))
 
 
 def at(row: SweepRow, place: int) -> float:
     """Return a row's value of the variable with the given index, as a float."""
-    value = row.point[place]
-    assert isinstance(value, (int, float))
-    return float(value)
+    return float(row.point[place])  # type: ignore[arg-type]

@@ -7,14 +7,14 @@ import math
 import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import msgspec
 import numpy as np
 
 from hand_models.base import InvalidInputError, LimitError
 from service.requests import PlanRequest
-from service.sweeping.paths import Paths, Steps, Target, set_value
+from service.sweeping.paths import Paths, Target
 from service.sweeping.variation import Value, Variation
 from service.wire import Format, decode_request, dotted
 
@@ -101,7 +101,7 @@ class Design:
         )
         paths = Paths.into(asked)
         targets = tuple(paths.target(each.path) for each in variations)
-        _check_apart(variations, targets)
+        _check_apart(targets)
         varied = tuple(map(_whole_numbers, variations, targets))
         if samples is None:
             points = tuple(itertools.product(*(each.values for each in varied)))
@@ -125,10 +125,7 @@ class Design:
     @property
     def labels(self) -> tuple[str, ...]:
         """Path and unit of each variation, such as ``load.mass [kg]``."""
-        return tuple(
-            each.path if target.unit is None else f"{each.path} [{target.unit}]"
-            for each, target in zip(self.variations, self.targets, strict=True)
-        )
+        return tuple(target.label for target in self.targets)
 
     @property
     def varying(self) -> list[int]:
@@ -181,21 +178,17 @@ class Design:
         bytes
             The request of the sweep, with the values of the point in it.
         """
-        varied: list[Steps] = []
-        for target, value in zip(self.targets, point, strict=True):
-            for steps in target.steps:
-                set_value(self._paths.document, steps, value)
-            varied += target.steps
-        self._paths.follow(varied)
-        return form.encode(self._paths.document)
+        return form.encode(self._document(point))
 
     def cap(self, point: Point) -> float:
         """Return the cap on the utilisation at a point, up to which the stance is feasible."""
-        for target, value in zip(self.targets, point, strict=True):
-            is_cap = target.steps == (("limits", "utilisation"),)
-            if is_cap and isinstance(value, (int, float)):
-                return float(value)
-        return float(self._paths.document["limits"]["utilisation"])
+        return float(self._document(point)["limits"]["utilisation"])
+
+    def _document(self, point: Point) -> dict[str, Any]:
+        """Return the request at a point as plain lists and dicts; the next call changes it."""
+        pairs = zip(self.targets, point, strict=True)
+        self._paths.set_values({at: value for target, value in pairs for at in target.steps})
+        return self._paths.document
 
     def _check_values(self, robots: Robots | None) -> None:
         """Refuse values that no request can have; check a range by its ends, and words as names."""
@@ -216,13 +209,9 @@ class Design:
                         raise
 
 
-def _check_apart(variations: Sequence[Variation], targets: Sequence[Target]) -> None:
+def _check_apart(targets: Sequence[Target]) -> None:
     """Refuse a value that would be set twice."""
-    ends = [
-        (steps, each.path)
-        for each, target in zip(variations, targets, strict=True)
-        for steps in target.steps
-    ]
+    ends = [(steps, target.path) for target in targets for steps in target.steps]
     for (first, path), (steps, again) in itertools.combinations(ends, 2):
         if all(map(operator.eq, first, steps)):
             same = "is given twice" if path == again else f"varies the same field as {path}"
@@ -235,10 +224,8 @@ def _whole_numbers(variation: Variation, target: Target) -> Variation:
         return variation
     values = [float(value) for value in variation.values]  # type: ignore[arg-type]
     if any(not value.is_integer() for value in values):
-        raise InvalidInputError(
-            f"takes whole numbers, got {', '.join(f'{value:g}' for value in values[:9])}",
-            field=variation.path,
-        )
+        given = ", ".join(f"{value:g}" for value in values[:9])
+        raise InvalidInputError(f"takes whole numbers, got {given}", field=variation.path)
     return Variation(variation.path, tuple(map(int, values)), variation.ranged)
 
 
@@ -255,11 +242,8 @@ def _hypercube(
 
 def _value_at(variation: Variation, target: Target, share: float) -> Value:
     """Return the value of a variation at a share of it in [0, 1)."""
-    if not variation.ranged:
-        return variation.values[int(share * len(variation.values))]
     low, high = variation.values[0], variation.values[-1]
-    assert isinstance(low, (int, float))
-    assert isinstance(high, (int, float))
-    if target.whole:
-        return int(low) + int(share * (int(high) - int(low) + 1))
-    return low + share * (high - low)
+    if variation.ranged and not target.whole:
+        return low + share * (high - low)  # type: ignore[operator]
+    choices = range(low, high + 1) if variation.ranged else variation.values  # type: ignore[arg-type, operator]
+    return choices[int(share * len(choices))]

@@ -7,7 +7,7 @@ given by the name of a preset is replaced by the preset's numbers.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
@@ -20,7 +20,7 @@ from planner import EARTH_GRAVITY
 from service.requests import PlanRequest, StanceMessage, SurfaceMessage
 from service.wire import PossibleType, entered, field_names, places_at
 
-__all__ = ["Paths", "Steps", "Target", "set_value"]
+__all__ = ["Paths", "Steps", "Target"]
 
 Steps = tuple[str | int, ...]
 """Keys and indices that lead from a document to one value in it."""
@@ -28,12 +28,25 @@ Steps = tuple[str | int, ...]
 KEYED_TYPES: Final = (inspect.StructType, inspect.DictType)
 LISTED_TYPES: Final = (inspect.ListType, inspect.TupleType, inspect.VarTupleType)
 
+LIMB_KEYED: Final[tuple[Steps, ...]] = (
+    ("stance", "joints"), ("limits", "joint_torque"), ("limits", "per_hand"), ("present",),
+)  # fmt: skip
+"""Objects whose keys are limbs."""
+
+FIXED_FIELDS: Final = {
+    "v", "id", "deadline", "max_reply_bytes", "confidence", "detail", "want", "draws", "open_loop",
+    "survival", "explain",
+}  # fmt: skip
+"""Fields of a request that are no part of what is asked about."""
+
 
 class Target(NamedTuple):
     """Places in a document that a path leads to.
 
     Attributes
     ----------
+    path : str
+        The path.
     steps : tuple of Steps
         Keys and indices that lead to each value; several if the path has a ``*``.
     unit : str or None
@@ -42,9 +55,15 @@ class Target(NamedTuple):
         True if only whole numbers are valid there.
     """
 
+    path: str
     steps: tuple[Steps, ...]
     unit: str | None
     whole: bool
+
+    @property
+    def label(self) -> str:
+        """Path and unit, such as ``load.mass [kg]``."""
+        return self.path if self.unit is None else f"{self.path} [{self.unit}]"
 
 
 @dataclass
@@ -66,10 +85,8 @@ class Paths:
     @classmethod
     def into(cls, request: PlanRequest) -> Paths:
         """Return the lookup in a plan request's document, without samples of any kind."""
-        document = _filled(request)
+        document = _filled(msgspec.structs.replace(request, open_loop=None, survival=None))
         del document["draws"]
-        document.pop("open_loop", None)
-        document.pop("survival", None)
         document["stance"].setdefault("gravity", list(EARTH_GRAVITY))
         return cls(document)
 
@@ -100,10 +117,8 @@ class Paths:
         for name in names:
             found = [each for end in found for each in self._entered(path, name, *end)]
         for steps, places in found:
-            if all(
-                isinstance(each.kind, (*KEYED_TYPES, *LISTED_TYPES, inspect.NoneType))
-                for each in places
-            ):
+            compound = (*KEYED_TYPES, *LISTED_TYPES, inspect.NoneType)
+            if all(isinstance(each.kind, compound) for each in places):
                 known = ", ".join(self._listed(steps, places, _at(self.document, steps)))
                 more = f"; give one of its entries: {known}" if known else ""
                 raise InvalidInputError(f"is not a number or a word{more}", field=path)
@@ -111,29 +126,29 @@ class Paths:
         kinds = {type(each.kind): each.units for each in places}
         units = kinds.get(inspect.FloatType) or kinds.get(inspect.IntType) or self._own_unit(steps)
         whole = inspect.IntType in kinds and inspect.FloatType not in kinds
-        return Target(
-            tuple(each for each, _ in found), units[0] if len(units) == 1 else None, whole
-        )
+        unit = units[0] if len(units) == 1 else None
+        return Target(path, tuple(each for each, _ in found), unit, whole)
 
-    def follow(self, varied: Iterable[Steps]) -> None:
-        """Scale the other strengths of surface presets with their shear limits.
+    def set_values(self, given: Mapping[Steps, Any]) -> None:
+        """Set values, and scale the other strengths of surface presets with their shear limits.
 
         In a preset, pull-off limit, lateral limit and shear scatter are proportional to the shear
         limit. They keep this ratio unless they vary themselves.
 
         Parameters
         ----------
-        varied : iterable of Steps
-            Places whose values have been set.
+        given : mapping of Steps to object
+            Values by their places.
         """
-        given = set(varied)
+        for steps, value in given.items():
+            _set_value(self.document, steps, value)
         for steps, name in self.presets.items():
             preset = Surface.named(name)
             share = _at(self.document, steps)["shear_limit"] / preset.shear_limit
             # its parameter file gives these over its shear limit
             for key in ("pull_off_limit", "lateral_limit", "shear_scatter"):
                 if (*steps, key) not in given:
-                    set_value(self.document, (*steps, key), share * getattr(preset, key))
+                    _set_value(self.document, (*steps, key), share * getattr(preset, key))
 
     def _entered(
         self, path: str, name: str, steps: Steps, places: list[PossibleType]
@@ -147,49 +162,41 @@ class Paths:
             raise InvalidInputError(
                 f"{words} has no entries in the request; add the one to vary", field=path
             )
-        free = any(isinstance(each.kind, inspect.DictType) for each in places)
+        free = _may_be(places, inspect.DictType)
         several = ["*"] if free or isinstance(value, list) else []
         known: dict[str, str | int] = {key: key for key in listed}
         if isinstance(value, list):
-            known = {
-                key: i
-                for keys in (listed, map(str, range(len(value))))
-                for i, key in enumerate(keys)
-            }
+            known = {name: i for i, key in enumerate(listed) for name in (key, str(i))}
         if name not in (*known, *several):
             more = "" if steps else f"; and of the stance {', '.join(_fields(StanceMessage))}"
             raise InvalidInputError(
                 f"{words} has no {name!r}; known are {', '.join(listed + several)}{more}",
                 field=path,
             )
-        anything = any(isinstance(each.kind, inspect.AnyType) for each in places)
+        anything = _may_be(places, inspect.AnyType)
+        chosen = dict.fromkeys(known.values()) if name in several else [known[name]]
         return [
             ((*steps, step), places if anything else entered(places, None if free else step))
-            for step in (dict.fromkeys(known.values()) if name in several else [known[name]])
+            for step in chosen
         ]
 
     def _opened(self, path: str, steps: Steps, places: list[PossibleType]) -> Any:
         """Return the value that a path leads through; put there, if it is left out."""
         value = _at(self.document, steps)
-        kinds = [each.kind for each in places]
-        if value is None and any(isinstance(kind, KEYED_TYPES) for kind in kinds):
-            value = next(
-                (_default(each) for each in kinds if isinstance(each, inspect.StructType)), {}
-            )
-            set_value(self.document, steps, value)
-        elif isinstance(value, str) and any(_is_surface(kind) for kind in kinds):
+        structs = [each.kind for each in places if isinstance(each.kind, inspect.StructType)]
+        if value is None and _may_be(places, *KEYED_TYPES):
+            value = _default(structs[0]) if structs else {}
+            _set_value(self.document, steps, value)
+        elif isinstance(value, str) and any(kind.cls is SurfaceMessage for kind in structs):
             self.presets[steps], preset = value, Surface.named(value)
             value = {key: getattr(preset, key) for key in _fields(SurfaceMessage)}
-            set_value(self.document, steps, value)
+            _set_value(self.document, steps, value)
         if isinstance(value, (dict, list)):
             return value
         words = self._words(steps)
-        if value is None and any(
-            isinstance(kind, (*LISTED_TYPES, inspect.AnyType)) for kind in kinds
-        ):
+        if value is None and _may_be(places, *LISTED_TYPES, inspect.AnyType):
             raise InvalidInputError(
-                f"{words} has no value in the request; add one to vary its entries",
-                field=path,
+                f"{words} has no value in the request; add one to vary its entries", field=path
             )
         found = f"is {value!r} in the request" if _meant(places, value) else "is a number or a word"
         raise InvalidInputError(f"{words} {found}, without entries: end the path there", field=path)
@@ -209,19 +216,10 @@ class Paths:
         for each in places:
             if isinstance(each.kind, inspect.StructType):
                 names = field_names(place.kind for place in _meant(places, value))
-                # fields of a request that are no part of what is asked about
-                fixed = {"v", "id", "deadline", "max_reply_bytes", "confidence", "detail", "want"}
-                fixed |= {"draws", "open_loop", "survival", "explain"}
-                return [name for name in names if steps or name not in fixed]
+                return [name for name in names if steps or name not in FIXED_FIELDS]
             if isinstance(each.kind, inspect.TupleType):
                 return [str(i) for i in range(len(each.kind.item_types))]
-        by_limb: set[Steps] = {
-            ("stance", "joints"),
-            ("limits", "joint_torque"),
-            ("limits", "per_hand"),
-            ("present",),
-        }
-        return list(dict.fromkeys([*(limbs if steps in by_limb else ()), *(value or ())]))
+        return list(dict.fromkeys([*(limbs if steps in LIMB_KEYED else ()), *(value or ())]))
 
     def _words(self, steps: Steps) -> str:
         """Return steps as a caller writes them."""
@@ -231,18 +229,8 @@ class Paths:
         return ".".join(words[1:] if words[1:] and words[0] == "stance" else words) or "a request"
 
 
-def set_value(document: Any, steps: Steps, value: Any) -> None:
-    """Set the value at one place of a document.
-
-    Parameters
-    ----------
-    document : dict or list
-        Document, which is changed in place.
-    steps : Steps
-        Keys and indices that lead to the value.
-    value : object
-        New value.
-    """
+def _set_value(document: Any, steps: Steps, value: Any) -> None:
+    """Set the value at one place of a document, which is changed in place."""
     _at(document, steps[:-1])[steps[-1]] = value
 
 
@@ -282,19 +270,22 @@ def _fields(kind: type) -> list[str]:
     return field_names(place.kind for place in places_at(kind, ()))
 
 
-def _is_surface(kind: inspect.Type) -> bool:
-    return isinstance(kind, inspect.StructType) and kind.cls is SurfaceMessage
+def _may_be(places: list[PossibleType], *kinds: type[inspect.Type]) -> bool:
+    return any(isinstance(each.kind, kinds) for each in places)
 
 
 def _meant(places: list[PossibleType], value: Any) -> list[PossibleType]:
     """Return the places of compounds that a value is one of."""
-    found = []
-    for place in places:
-        kind = place.kind
-        tag = {kind.tag_field: kind.tag} if isinstance(kind, inspect.StructType) else {}
-        another = isinstance(value, dict) and any(
-            key and value.get(key) != name for key, name in tag.items()
-        )
-        if not another and isinstance(kind, (*KEYED_TYPES, *LISTED_TYPES, inspect.AnyType)):
-            found.append(place)
-    return found
+    compound = (*KEYED_TYPES, *LISTED_TYPES, inspect.AnyType)
+    return [
+        place
+        for place in places
+        if isinstance(place.kind, compound) and not _tagged_otherwise(place.kind, value)
+    ]
+
+
+def _tagged_otherwise(kind: inspect.Type, value: Any) -> bool:
+    """Return whether a value has the tag of another struct than this one."""
+    if not (isinstance(kind, inspect.StructType) and kind.tag_field and isinstance(value, dict)):
+        return False
+    return value.get(kind.tag_field) != kind.tag

@@ -6,19 +6,21 @@ import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap, TwoSlopeNorm
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from hand_models.base import COLOUR_OF, SERIES_COLOURS, Array, write_picture
+from hand_models.base import COLOUR_OF, SERIES_COLOURS, Array, panel_grid, write_picture
 from service.sweeping.results import Sweep
 from service.sweeping.rows import State, SweepRow
 from service.sweeping.variation import Value, word_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["plot_sweep"]
 
@@ -29,7 +31,7 @@ LINE_STYLES: Final[dict[str, dict[str, Any]]] = {
 }
 
 Columns = dict[str, Any]
-"""Arrays over the rows of a panel: state, holds, utilisation, load factor, margin, x and y."""
+"""Arrays over the rows of a panel: state, utilisation, load factor, margin, x and y."""
 
 
 class Look(NamedTuple):
@@ -93,11 +95,10 @@ def plot_sweep(sweep: Sweep, path: Path, title: str, over: Sequence[str] | None 
     if over is not None:
         figure = _maps(sweep, *design.places_of(over))
     elif len(varying) == 1 or (len(varying) == 2 and len(numbers) == 1 and not sampled):
-        figure = _plots(
-            sweep, [(ordered[0], "utilisation"), (ordered[0], "load factor")], ordered[1:]
-        )
+        place, *series = ordered
+        figure = _plots(sweep, [(place, "utilisation"), (place, "load factor")], *series)
     elif sampled and len(varying) > 2:
-        figure = _plots(sweep, [(place, "utilisation") for place in varying], [])
+        figure = _plots(sweep, [(place, "utilisation") for place in varying])
     else:
         figure = _maps(sweep, *(varying if sampled else ordered)[:2])
     holding = sum(row.holds for row in sweep.rows)
@@ -126,13 +127,10 @@ class Side:
     def __init__(self, sweep: Sweep, place: int) -> None:
         variation = sweep.design.variations[place]
         self.place, self.label = place, sweep.design.labels[place]
-        self.values = list(dict.fromkeys(row.point[place] for row in sweep.rows))
-        self.words: list[str] = []
+        self.values, self.words = list(variation.values), list(map(word_of, variation.values))
         if variation.numbers:
-            self.values.sort()
-        else:
-            self.values = list(variation.values)
-            self.words = list(map(word_of, self.values))
+            self.values = sorted({row.point[place] for row in sweep.rows})  # type: ignore[type-var]
+            self.words = []
         self.places = np.array(range(len(self.words)) if self.words else self.values, float)
 
     def of(self, rows: Sequence[SweepRow]) -> Array:
@@ -143,11 +141,9 @@ class Side:
     @property
     def edges(self) -> Array:
         """Ends of the values' cells along the axis, halfway between values, shape (values + 1,)."""
-        if len(self.places) == 1:
-            return np.array([self.places[0] - 0.5, self.places[0] + 0.5])
-        middle = 0.5 * (self.places[1:] + self.places[:-1])
-        first, last = 2.0 * self.places[[0, -1]] - middle[[0, -1]]
-        return np.array([first, *middle, last])
+        half = 0.5 * (np.diff(self.places) if len(self.places) > 1 else np.ones(1))
+        middle = self.places[:-1] + half[: len(self.places) - 1]
+        return np.hstack([self.places[0] - half[0], middle, self.places[-1] + half[-1]])
 
     def label_axis(self, axis: Any) -> None:
         """Set the label of a matplotlib axis, and its tick labels if the values are words."""
@@ -159,26 +155,26 @@ class Side:
             axis.axes.set(**{f"{axis.axis_name}lim": self.edges[[0, -1]]})
 
 
-def _columns(rows: Sequence[SweepRow], x: Side, y: Side | None = None) -> Columns:
-    """Return what is drawn of rows."""
-    found: Columns = {
-        name: np.array([getattr(row, name.replace(" ", "_")) for row in rows], float)
-        for name in ("utilisation", "load factor", "margin")
-    }
-    found |= {name: np.array([getattr(row, name) for row in rows]) for name in ("state", "holds")}
-    return found | {"x": x.of(rows), "y": x.of(rows) if y is None else y.of(rows)}
+def _columns(rows: Sequence[SweepRow], **sides: Side) -> Columns:
+    """Return what is drawn of rows, with their coordinates along the sides."""
+    names = ("utilisation", "load_factor", "margin")
+    found: Columns = {name: np.array([getattr(row, name) for row in rows], float) for name in names}
+    found |= {name: side.of(rows) for name, side in sides.items()}
+    return found | {"state": np.array([row.state for row in rows])}
 
 
-def _figure(
-    count: int, size: tuple[float, float], columns: int, **shared: Any
-) -> tuple[Figure, list[Any]]:
-    """Return a figure with so many panels of a size [in]."""
-    lines = math.ceil(count / columns)
-    figure = Figure(figsize=(0.8 + size[0] * columns, 1.6 + size[1] * lines), layout="constrained")
-    panels = list(figure.subplots(lines, columns, squeeze=False, **shared).ravel())
-    for axes in panels[count:]:
-        axes.remove()
-    return figure, panels[:count]
+def _rows_by(sweep: Sweep, place: int | None, values: Sequence[Value]) -> list[list[SweepRow]]:
+    """Return the rows with each of some values of a variation; all rows where there is none."""
+    return [
+        [row for row in sweep.rows if place is None or row.point[place] == value]
+        for value in values
+    ]
+
+
+def _common_cap(rows: Sequence[SweepRow]) -> float | None:
+    """Return the cap on the utilisation, if all rows have the same."""
+    caps = {row.cap for row in rows}
+    return caps.pop() if len(caps) == 1 else None
 
 
 def _legend(figure: Figure, handles: Sequence[Any], title: str | None = None) -> None:
@@ -189,32 +185,40 @@ def _legend(figure: Figure, handles: Sequence[Any], title: str | None = None) ->
         figure.legend(handles=handles, title=title, fontsize=9, **place)
 
 
+def _looks(rows: Sequence[SweepRow]) -> list[Look]:
+    """Return the looks of the states that there are."""
+    states = {row.state for row in rows}
+    return [look for state, look in STATE_LOOKS.items() if state in states]
+
+
 def _markers(rows: Sequence[SweepRow], colour: str | None = None) -> list[Any]:
     """Return the legend of the states that there are, in their colours or in one."""
     return [
         Line2D([], [], ls="", marker=look.marker, color=colour or look.colour, label=look.words)
-        for state, look in STATE_LOOKS.items()
-        if any(row.state == state for row in rows)
+        for look in _looks(rows)
     ]
 
 
 # Curves -------------------------------------------------------------------------------------------
 
 
-def _plots(sweep: Sweep, panels: Sequence[tuple[int, str]], series: Sequence[int]) -> Figure:
+def _plots(sweep: Sweep, panels: Sequence[tuple[int, str]], series: int | None = None) -> Figure:
     """Draw numbers over variations, each in a panel, as a curve for each value of a series."""
     curves = panels[0][1] != panels[-1][1]
-    columns, size = (1, (7.2, 2.5)) if curves else (min(3, len(panels)), (4.0, 3.4))
-    figure, every = _figure(len(panels), size, columns, sharex=curves, sharey=not curves)
-    design, caps = sweep.design, {row.cap for row in sweep.rows}
-    values = design.variations[series[0]].values if series else (None,)
+    columns = 1 if curves else min(3, len(panels))
+    size = (8.0, 6.6) if curves else (0.8 + 4.0 * columns, 1.6 + 3.4 * -(-len(panels) // columns))
+    figure, every = panel_grid(len(panels), columns, size, sharex=curves, sharey=not curves)
+    design, cap = sweep.design, _common_cap(sweep.rows)
+    values: Sequence[Value] = (None,) if series is None else design.variations[series].values
+    colours = itertools.cycle([None] if series is None else SERIES_COLOURS)
+    named = list(zip(values, _rows_by(sweep, series, values), colours, strict=False))
     for axes, (place, name) in zip(every, panels, strict=True):
         side = Side(sweep, place)
-        for k, value in enumerate(values):
-            rows = [row for row in sweep.rows if not series or row.point[series[0]] == value]
-            colour = SERIES_COLOURS[k % len(SERIES_COLOURS)] if series else None
-            _draw_curve(axes, _columns(rows, side), name, colour, curves and not side.words)
-        for limit in (1.0,) if name == "load factor" else caps if len(caps) == 1 else ():
+        for _, rows, colour in named:
+            heights = name.replace(" ", "_")
+            _draw_curve(axes, _columns(rows, x=side), heights, colour, curves and not side.words)
+        limit = 1.0 if name == "load factor" else cap
+        if limit is not None:
             axes.axhline(limit, **LINE_STYLES["cap"])
         for border in sweep.borders:
             axes.axvline(border.holds, **LINE_STYLES["stop"])
@@ -224,17 +228,13 @@ def _plots(sweep: Sweep, panels: Sequence[tuple[int, str]], series: Sequence[int
         side.label_axis(axes.xaxis)
         if curves:
             axes.label_outer()
-    lines = zip(itertools.cycle(SERIES_COLOURS), values if series else (), strict=False)
-    handles = [Line2D([], [], color=colour, label=word_of(value)) for colour, value in lines]
-    handles += _markers(sweep.rows, "0.3" if series else None)
-    if len(caps) == 1:
-        handles.append(
-            Line2D([], [], **LINE_STYLES["cap"], label=f"cap on the utilisation: {caps.pop():g}")
-        )
+    handles = [Line2D([], [], color=c, label=word_of(v)) for v, _, c in named if c is not None]
+    handles += _markers(sweep.rows, None if series is None else "0.3")
+    lines = [] if cap is None else [("cap", f"cap on the utilisation: {cap:g}")]
     for border in sweep.borders:
-        words = f"stops holding at {border.holds:.4g} {border.unit or ''}".strip()
-        handles.append(Line2D([], [], **LINE_STYLES["stop"], label=words))
-    _legend(figure, handles, design.labels[series[0]] if series else None)
+        lines.append(("stop", f"stops holding at {border.holds:.4g} {border.unit or ''}".strip()))
+    handles += [Line2D([], [], **LINE_STYLES[kind], label=words) for kind, words in lines]
+    _legend(figure, handles, None if series is None else design.labels[series])
     return figure
 
 
@@ -245,11 +245,12 @@ def _draw_curve(axes: Any, drawn: Columns, name: str, colour: str | None, line: 
         axes.plot(drawn["x"][order], drawn[name][order], color=colour or COLOUR_OF["blue"])
     for state, look in STATE_LOOKS.items():
         there = drawn["state"] == state
-        # in axes, for points without a utilisation
-        top = 0.97
-        heights = np.full(there.sum(), top) if look.hatch else drawn[name][there]
-        across = axes.get_xaxis_transform() if look.hatch else axes.transData
-        style = {"color": colour or look.colour, "markersize": 4, "transform": across}
+        style: dict[str, Any] = {"color": colour or look.colour, "markersize": 4}
+        heights = drawn[name][there]
+        if look.hatch:
+            # in axes, for points without a utilisation
+            top = 0.97
+            heights, style["transform"] = np.full(there.sum(), top), axes.get_xaxis_transform()
         axes.plot(drawn["x"][there], heights, look.marker, **style)
 
 
@@ -260,40 +261,37 @@ def _maps(sweep: Sweep, *pair: int) -> Figure:
     """Draw a map over two variations, or one for each of some values of a third."""
     design = sweep.design
     others = [] if design.sampled else [i for i in design.varying if i not in pair]
-    values: list[Value] = [None]
+    third, values = None, [None]
     if others:
-        given = Side(sweep, others[0]).values
+        third, given = others[0], Side(sweep, others[0]).values
         # six panels at most, and so three side by side
         values = [given[round(i)] for i in np.linspace(0, len(given) - 1, min(len(given), 6))]
     columns = math.ceil(math.sqrt(len(values)))
-    size = (4.4, 3.9) if others else (7.4, 4.8)
-    figure, every = _figure(len(values), size, columns, sharex=True, sharey=True)
-    groups = [
-        [row for row in sweep.rows if not others or row.point[others[0]] == value]
-        for value in values
-    ]
+    wide, high = (4.4, 3.9) if others else (7.4, 4.8)
+    size = (0.8 + wide * columns, 1.6 + high * -(-len(values) // columns))
+    figure, every = panel_grid(len(values), columns, size, sharex=True, sharey=True)
+    groups = _rows_by(sweep, third, values)
     shown = [row for rows in groups for row in rows]
     x, y = (Side(sweep, place) for place in pair)
     colours, extend = _colours(shown)
-    drawn = None
+    draw, drawn = _draw_samples if design.sampled else _draw_map, None
     for i, (axes, value, rows) in enumerate(zip(every, values, groups, strict=True)):
-        draw = _draw_samples if design.sampled else _draw_map
-        drawn = draw(axes, x, y, _columns(rows, x, y), colours) or drawn
+        drawn = draw(axes, x, y, _columns(rows, x=x, y=y), colours) or drawn
         x.label_axis(axes.xaxis)
         y.label_axis(axes.yaxis)
         axes.label_outer()
         if i + columns >= len(values):
             axes.xaxis.set_tick_params(labelbottom=True)
             axes.set_xlabel(x.label)
-        if others:
-            unit = design.targets[others[0]].unit or ""
-            words = f"{design.variations[others[0]].path} = {word_of(value)} {unit}"
+        if third is not None:
+            target = design.targets[third]
+            words = f"{target.path} = {word_of(value)} {target.unit or ''}"
             axes.set_title(words.strip(), fontsize=9)
     if drawn is not None:
         figure.colorbar(drawn, ax=every, label="utilisation [1]", extend=extend)
     _legend(figure, _markers(shown) if design.sampled else _map_handles(shown))
     if others[1:]:
-        names = ", ".join(design.variations[i].path for i in others[1:])
+        names = ", ".join(design.targets[i].path for i in others[1:])
         figure.suptitle(f"each cell: the worst over {names}")
     return figure
 
@@ -304,8 +302,7 @@ def _colours(rows: Sequence[SweepRow]) -> tuple[dict[str, Any], str]:
     It is blue where it holds, white at the cap, and red beyond.
     """
     used = [row.utilisation for row in rows if row.utilisation is not None]
-    caps = {row.cap for row in rows}
-    cap = caps.pop() if len(caps) == 1 else 1.0
+    cap = _common_cap(rows) or 1.0
     low, high = min(used, default=0.0), max(used, default=cap)
     # at least from 0.5 to 1.5 caps, and at most to 2: what is beyond is as red as that
     top = max(min(high, 2.0 * cap), 1.5 * cap)
@@ -317,14 +314,13 @@ def _map_handles(rows: Sequence[SweepRow]) -> list[Any]:
     """Return the legend of a map: its border, and cells without a utilisation."""
     handles: list[Any] = []
     if len({row.holds for row in rows if row.state != "error"}) > 1:
-        caps = {row.cap for row in rows}
-        words = f": utilisation {caps.pop():g}" if len(caps) == 1 else ""
+        cap = _common_cap(rows)
+        words = "" if cap is None else f": utilisation {cap:g}"
         handles.append(Line2D([], [], color="black", lw=1.8, label=f"stops holding{words}"))
-    states = {row.state for row in rows}
     return handles + [
         Patch(facecolor=look.fill, edgecolor="0.4", hatch=look.hatch, label=look.words)
-        for state, look in STATE_LOOKS.items()
-        if look.hatch and state in states
+        for look in _looks(rows)
+        if look.hatch
     ]
 
 
@@ -339,10 +335,11 @@ def _draw_map(axes: Any, x: Side, y: Side, drawn: Columns, colours: dict[str, An
     states, margins = drawn["state"][cells], np.ma.masked_invalid(drawn["margin"][cells])
     used = np.ma.masked_invalid(drawn["utilisation"][cells])
     mesh = axes.pcolormesh(x.edges, y.edges, used, **colours)
-    for state in (state for state in names if (states == state).any() and STATE_LOOKS[state].hatch):
-        there, look = np.ma.masked_where(states != state, np.ones(states.shape)), STATE_LOOKS[state]
-        style = {"hatch": look.hatch, "cmap": ListedColormap([look.fill]), "edgecolor": "0.4"}
-        axes.pcolor(x.edges, y.edges, there, linewidth=0.0, **style)
+    for state, look in STATE_LOOKS.items():
+        if look.hatch and (states == state).any():
+            there = np.ma.masked_where(states != state, np.ones(states.shape))
+            style = {"hatch": look.hatch, "cmap": ListedColormap([look.fill]), "edgecolor": "0.4"}
+            axes.pcolor(x.edges, y.edges, there, linewidth=0.0, **style)
     known = ~np.ma.getmaskarray(margins)
     if x.words or y.words or not (known.any() and margins.min() < 1.0 < margins.max()):
         known[:] = False

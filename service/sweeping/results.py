@@ -46,17 +46,14 @@ class Sweep(NamedTuple):
     @property
     def counts(self) -> dict[str, int]:
         """Number of points by status: optimal, overloaded, infeasible, failed and error."""
-        found = Counter(row.status for row in self.rows)
-        statuses = ("optimal", "overloaded", "infeasible", "failed", "error")
-        return {status: found[status] for status in statuses}
+        none = dict.fromkeys(("optimal", "overloaded", "infeasible", "failed", "error"), 0)
+        return none | Counter(row.status for row in self.rows)
 
     @property
     def extremes(self) -> tuple[SweepRow, ...]:
         """Rows with the least and the largest utilisation; empty if no row has a utilisation."""
-        rows = [row for row in self.rows if row.utilisation is not None]
-        return tuple(
-            pick(rows, key=lambda row: row.utilisation or 0.0) for pick in (min, max) if rows
-        )
+        used = {row.utilisation: row for row in self.rows[::-1] if row.utilisation is not None}
+        return (used[min(used)], used[max(used)]) if used else ()
 
     def write_table(self, path: Path) -> None:
         """Write the rows as a CSV file.
@@ -82,25 +79,21 @@ class Sweep(NamedTuple):
             Variations, number of points, of answers and of each status, errors by kind, the points
             of least and largest utilisation, and the borders.
         """
-        variations, sampled = self.design.variations, self.design.sampled
-        paths = [each.path for each in variations]
+        design = self.design
+        paths = [each.path for each in design.variations]
         ends: list[Any] = [
             {"at": dict(zip(paths, row.point, strict=True)), "utilisation": row.utilisation}
             for row in self.extremes
         ] or [None, None]
-        values = [
-            {"low": each.values[0], "high": each.values[-1]}
-            if sampled and each.ranged
-            else each.values
-            for each in variations
-        ]
+        varied = []
+        for each, target in zip(design.variations, design.targets, strict=True):
+            low_high = {"low": each.values[0], "high": each.values[-1]}
+            values = low_high if design.sampled and each.ranged else each.values
+            varied.append({"path": each.path, "unit": target.unit, "values": values})
         return {
             "v": 1,
-            "variations": [
-                {"path": path, "unit": target.unit, "values": given}
-                for path, target, given in zip(paths, self.design.targets, values, strict=True)
-            ],
-            "points": len(self.design.points),
+            "variations": varied,
+            "points": design.count,
             "answered": sum(row.answered for row in self.rows),
             "statuses": self.counts,
             "errors": dict(Counter(row.error.kind for row in self.rows if row.error is not None)),
@@ -208,7 +201,7 @@ def sweep(
     ]
     asked = with_robot(with_hand(request, hand), robot)
     design = Design.of(asked, chosen, samples, seed, robots_of(robot))
-    report, total = progress or (lambda *_: None), len(design.points)
+    report, total = progress or (lambda *_: None), design.count
     report(0, total)
     rows = []
     for row in rows_at(design, design.points, asking(total, workers, robot, on)):
