@@ -163,6 +163,14 @@ def _columns(rows: Sequence[SweepRow], **sides: Side) -> Columns:
     return found | {"state": np.array([row.state for row in rows])}
 
 
+def _figure(
+    count: int, columns: int, size: tuple[float, float], **shared: bool
+) -> tuple[Figure, list[Any]]:
+    """Return a figure with so many panels of a size [in]."""
+    whole = 0.8 + size[0] * columns, 1.6 + size[1] * math.ceil(count / columns)
+    return panel_grid(count, columns, whole, **shared)
+
+
 def _rows_by(sweep: Sweep, place: int | None, values: Sequence[Value]) -> list[list[SweepRow]]:
     """Return the rows with each of some values of a variation; all rows where there is none."""
     return [
@@ -205,9 +213,8 @@ def _markers(rows: Sequence[SweepRow], colour: str | None = None) -> list[Any]:
 def _plots(sweep: Sweep, panels: Sequence[tuple[int, str]], series: int | None = None) -> Figure:
     """Draw numbers over variations, each in a panel, as a curve for each value of a series."""
     curves = panels[0][1] != panels[-1][1]
-    columns = 1 if curves else min(3, len(panels))
-    size = (8.0, 6.6) if curves else (0.8 + 4.0 * columns, 1.6 + 3.4 * -(-len(panels) // columns))
-    figure, every = panel_grid(len(panels), columns, size, sharex=curves, sharey=not curves)
+    columns, size = (1, (7.2, 2.5)) if curves else (min(3, len(panels)), (4.0, 3.4))
+    figure, every = _figure(len(panels), columns, size, sharex=curves, sharey=not curves)
     design, cap = sweep.design, _common_cap(sweep.rows)
     values: Sequence[Value] = (None,) if series is None else design.variations[series].values
     colours = itertools.cycle([None] if series is None else SERIES_COLOURS)
@@ -267,9 +274,8 @@ def _maps(sweep: Sweep, *pair: int) -> Figure:
         # six panels at most, and so three side by side
         values = [given[round(i)] for i in np.linspace(0, len(given) - 1, min(len(given), 6))]
     columns = math.ceil(math.sqrt(len(values)))
-    wide, high = (4.4, 3.9) if others else (7.4, 4.8)
-    size = (0.8 + wide * columns, 1.6 + high * -(-len(values) // columns))
-    figure, every = panel_grid(len(values), columns, size, sharex=True, sharey=True)
+    size = (4.4, 3.9) if others else (7.4, 4.8)
+    figure, every = _figure(len(values), columns, size, sharex=True, sharey=True)
     groups = _rows_by(sweep, third, values)
     shown = [row for rows in groups for row in rows]
     x, y = (Side(sweep, place) for place in pair)

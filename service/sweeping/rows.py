@@ -227,14 +227,11 @@ def sweep_row(design: Design, point: Point, payload: bytes) -> SweepRow:
 
 def sweep_columns(design: Design) -> tuple[Column, ...]:
     """Return the columns of a sweep's table: one for each variation, then `RESULT_COLUMNS`."""
-    varied = zip(design.labels, design.variations, design.targets, strict=True)
-    return (
-        *(
-            Column(label, "float" if each.numbers else "text", target.unit or "", each.path)
-            for label, each, target in varied
-        ),
-        *RESULT_COLUMNS,
+    varied = (
+        Column(target.label, "float" if each.numbers else "text", target.unit or "", each.path)
+        for each, target in zip(design.variations, design.targets, strict=True)
     )
+    return (*varied, *RESULT_COLUMNS)
 
 
 class PointRows(TableLines):

@@ -99,9 +99,9 @@ class Variation:
             raise InvalidInputError(f"LOW must be below HIGH, got {low:g}:{high:g}", field=path)
         most = 10_000
         if not 2 <= count <= most:
+            alone = f"one value alone is {path}={low:g}"
             raise InvalidInputError(
-                f"COUNT must be from 2 to {most}, got {count}; one value alone is {path}={low:g}",
-                field=path,
+                f"COUNT must be from 2 to {most}, got {count}; {alone}", field=path
             )
         values = [float(f"{value:.12g}") for value in np.linspace(low, high, count)]
         return cls(path, tuple(values), ranged=True)
