@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from hand_models.base import COLOUR_OF
+from hand_models.base import COLOUR_OF, panel_grid
 from hand_models.experiments.force_limits import MEASURE_UNITS, Measure
 from hand_models.finger import PHALANGES
 
@@ -27,13 +27,10 @@ __all__ = [
     "panels",
 ]
 
-PHALANX_COLOURS: Final = dict(
-    zip(
-        PHALANGES,
-        (COLOUR_OF["red"], COLOUR_OF["green"], COLOUR_OF["blue"]),
-        strict=True,
-    )
-)
+PHALANX_COLOURS: Final = {
+    phalanx: COLOUR_OF[name]
+    for phalanx, name in zip(PHALANGES, ("red", "green", "blue"), strict=True)
+}
 """Colour of each phalanx in every picture; for failures the paper also uses red and blue."""
 
 STATE_COLOURS: Final = {
@@ -69,8 +66,7 @@ def panels(
     tuple of (Figure, list of Axes)
         The axes row by row.
     """
-    figure = Figure(figsize=size, layout="constrained")
-    axes = figure.subplots(rows, columns, squeeze=False, **options).ravel().tolist()
+    figure, axes = panel_grid(rows * columns, columns, size, **options)
     for each in axes if grid != "none" else ():
         each.grid(axis=grid, alpha=0.3)
     return figure, axes
@@ -100,10 +96,8 @@ def conditions_title(conditions: dict[str, Any]) -> str:
     conditions : dict
         The fields of `Conditions`: ``diameter`` [m], ``tension`` [N] and ``surface``.
     """
-    return (
-        f"{1e3 * conditions['diameter']:g} mm, tendons at {conditions['tension']:g} N, "
-        f"{conditions['surface']}"
-    )
+    diameter, tension, surface = (conditions[key] for key in ("diameter", "tension", "surface"))
+    return f"{1e3 * diameter:g} mm, tendons at {tension:g} N, {surface}"
 
 
 def entry_name(entry: str) -> str:

@@ -14,7 +14,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
-from hand_models.base import COLOUR_OF, Array, Indices, Pose, write_picture
+from hand_models.base import COLOUR_OF, Array, Indices, Pose, draw_arrow, write_picture
 from hand_models.rock import Triangles
 from hand_models.scans.rock import ScannedRock
 
@@ -49,16 +49,10 @@ def _name_holes(axes: Axes, rock: ScannedRock) -> None:
         if any((np.abs(spot - other) < apart).all() for other in named):
             continue
         named.append(spot)
-        axes.text(
-            float(spot[0]),
-            float(spot[1]),
-            f"{1e3 * hole.width:.0f} mm",
-            color="red",
-            fontsize=8,
-            ha="center",
-            va="bottom",
-            bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none"},
-        )
+        style: dict[str, Any] = {"color": "red", "fontsize": 8, "ha": "center", "va": "bottom"}
+        style["bbox"] = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none"}
+        x, y = spot.tolist()
+        axes.text(x, y, f"{1e3 * hole.width:.0f} mm", **style)
 
 
 def plot_holds(
@@ -118,12 +112,7 @@ def _rank(axes: Axes, best: Sequence[Pose], length: float) -> None:
     labels: list[tuple[Array, list[str]]] = []
     for rank, pose in enumerate(best, start=1):
         start, way = pose.position[[1, 0]], length * pose.rotation[[1, 0], 0]
-        axes.annotate(
-            "",
-            tuple(start + way),
-            tuple(start),
-            arrowprops={"arrowstyle": "-|>", "color": "red", "shrinkA": 0.0, "shrinkB": 0.0},
-        )
+        draw_arrow(axes, start, start + way, "red")
         tip = start + 1.35 * way
         near = [ranks for at, ranks in labels if np.hypot(*(at - tip)) < 0.5 * length]
         if near:
@@ -131,16 +120,9 @@ def _rank(axes: Axes, best: Sequence[Pose], length: float) -> None:
         else:
             labels.append((tip, [str(rank)]))
     for (x, y), ranks in labels:
-        axes.text(
-            x,
-            y,
-            ", ".join(ranks),
-            color="white",
-            fontsize=8,
-            ha="center",
-            va="center",
-            bbox={"boxstyle": "round,pad=0.2", "facecolor": "red", "edgecolor": "none"},
-        )
+        style: dict[str, Any] = {"color": "white", "fontsize": 8, "ha": "center", "va": "center"}
+        style["bbox"] = {"boxstyle": "round,pad=0.2", "facecolor": "red", "edgecolor": "none"}
+        axes.text(x, y, ", ".join(ranks), **style)
     if best:
         axes.plot([], [], color="red", label="the best, ranked: x of H, where inner fingers point")
 
