@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from hand_models.base import Array, write_picture
+from hand_models.base import Array, draw_arrow, panel_grid, write_picture
 from planner.capability import OTHER_COMPONENTS, WRENCH_COMPONENTS, BodySection, BodySpace, Polygon
 from planner.pictures.settings import PICTURE_SETTINGS
 
@@ -59,19 +57,12 @@ def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: s
     drawn = [(view, outline) for view, outline in zip(views, outlines, strict=True) if outline]
     count = 1 + len(drawn)
     # in rows of two, which a page has room for without making texts small
-    rows, columns = math.ceil(count / 2), min(count, 2)
-    figure = Figure(figsize=(3.6 * columns, 0.5 + 3.9 * rows), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes in panels[count:]:
-        axes.remove()
-    _draw_section(panels[0], space, section)
-    for axes, (view, outline) in zip(panels[1:count], drawn, strict=True):
+    columns = min(count, 2)
+    size = 3.6 * columns, 0.5 + 3.9 * -(-count // 2)
+    figure, (first, *others) = panel_grid(count, columns, size)
+    _draw_section(first, space, section)
+    for axes, (view, outline) in zip(others, drawn, strict=True):
         _draw_accelerations(axes, space, view, outline)
-    for axes in panels[:count]:
-        axes.title.set_fontsize(9)
-        axes.tick_params(labelsize=8)
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.label.set_fontsize(8)
     used = space.plan.utilisation
     asked = "" if used is None else f", utilisation {used:.2f}"
     about = f"the body wrench asked for: {space.plan.status}{asked}"
@@ -125,10 +116,7 @@ def _draw_section(axes: Axes, space: BodySpace, section: BodySection) -> None:
         xlabel=f"{across} of the rock on the robot, in B [{across_unit}]",
         ylabel=f"{up} of the rock on the robot, in B [{up_unit}]",
     )
-    if across_unit == up_unit:
-        axes.set_aspect("equal", adjustable="datalim")
-    axes.grid(alpha=0.3)
-    _draw_legend(axes)
+    _finish(axes, equal=across_unit == up_unit)
 
 
 def _draw_accelerations(axes: Axes, space: BodySpace, view: _View, outline: Polygon) -> None:
@@ -143,9 +131,7 @@ def _draw_accelerations(axes: Axes, space: BodySpace, view: _View, outline: Poly
     axes.plot(0.0, 0.0, "o", color=PICTURE_SETTINGS.asked, markersize=5, label="at rest")
     if np.linalg.norm(gravity) > 1e-3:
         colour = PICTURE_SETTINGS.gravity
-        axes.annotate("", tuple(gravity), (0.0, 0.0), arrowprops={
-            "arrowstyle": "-|>", "color": colour, "linewidth": 1.6, "shrinkA": 0.0, "shrinkB": 0.0,
-        })  # fmt: skip
+        draw_arrow(axes, (0.0, 0.0), gravity, colour, linewidth=1.6)
         axes.plot([], [], color=colour, label="gravity")
         axes.plot(*gravity, alpha=0.0)
     asked = flat(np.array(space.question.load.acceleration))
@@ -153,13 +139,18 @@ def _draw_accelerations(axes: Axes, space: BodySpace, view: _View, outline: Poly
         style: dict[str, Any] = {"color": PICTURE_SETTINGS.asked, "markersize": 9, "mew": 2.0}
         axes.plot(*asked, "x", label="asked for", **style)
     axes.set(title=view.title, xlabel=view.xlabel, ylabel="ahead, along x of B [m/s²]")
-    axes.set_aspect("equal", adjustable="datalim")
+    _finish(axes, equal=True)
+
+
+def _finish(axes: Axes, *, equal: bool) -> None:
+    """Draw a grid, and a legend below the panel; with equal scales across and up, or not."""
+    if equal:
+        axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)
-    _draw_legend(axes)
-
-
-def _draw_legend(axes: Axes) -> None:
-    """Draw a legend below the panel, beside what is drawn."""
+    axes.title.set_fontsize(9)
+    axes.tick_params(labelsize=8)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.label.set_fontsize(8)
     axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2)
 
 

@@ -6,14 +6,13 @@ import math
 import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import groupby, pairwise
+from itertools import cycle, groupby, pairwise
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Final, get_args
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -31,13 +30,24 @@ from planner.climbs import FoundClimb
 from planner.pictures.body_plots import draw_polygon
 from planner.pictures.com_plots import axis_words
 from planner.pictures.plan_scene import WORLD_UP, drawn_scene, view_directions
-from planner.pictures.plan_views import UTILISATION_COLOURS, UTILISATION_NORM, View, draw_scene
+from planner.pictures.plan_tables import draw_bar
+from planner.pictures.plan_views import View, draw_scene
 from planner.pictures.settings import PICTURE_SETTINGS
 from planner.programs import WRENCH_UNIT
 from planner.result import Plan
 from planner.route import Climb, Knot, KnotPhase, RouteResult
 
 __all__ = ["draw_climb", "draw_support", "plot_wall"]
+
+DECIDING_STYLE: Final[dict[str, Any]] = {
+    "marker": "*", "linestyle": "none", "color": COLOUR_OF["red"], "markersize": 13,
+}  # fmt: skip
+"""Style of what decides how good a climb is."""
+
+NOT_FOUND: Final = {
+    "none": "proven: no climb holds enough", "blocked": "no moves of a climb have a plan",
+}  # fmt: skip
+"""What is said instead of load factors, by status."""
 
 
 def draw_climb(climb: Climb, result: RouteResult) -> Figure:
@@ -74,7 +84,8 @@ def draw_climb(climb: Climb, result: RouteResult) -> Figure:
             bodies += [each.vertices for each in scene.surfaces if each.kind in ("body", "link")]
             for artist in (*axes.lines, *axes.collections):
                 artist.set_clip_on(True)
-        way = np.array([_hand(each, knot.limb) for each in _swing_to(climb, knot)])
+        moving = [hand for each in _swing_to(climb, knot) for hand in each.hands]
+        way = np.array([hand.pose.position for hand in moving if hand.limb == knot.limb])
         if len(way) > 1:
             axes.plot(*flat(way).T, ".-", color=COLOUR_OF["purple"], markersize=3, zorder=9)
     places = [hand.pose.position for knot in climb.knots for hand in knot.hands]
@@ -85,19 +96,10 @@ def draw_climb(climb: Climb, result: RouteResult) -> Figure:
     high = np.maximum(extent.max(axis=0) + around, whole.max(axis=0) + edge)
     _set_frame(panels, low, high)
     _draw_margins(lower, climb)
-    figure.colorbar(
-        ScalarMappable(UTILISATION_NORM, UTILISATION_COLOURS),
-        ax=lower,
-        label="utilisation of a hand's force, a joint [1]",
-        extend="max",
-        pad=0.01,
-    )
+    draw_bar(figure, "utilisation of a hand's force, a joint [1]", ax=lower, pad=0.01)
     side = "above" if seen.steep and seen.into[2] < 0.0 else "below" if seen.steep else "behind"
-    figure.suptitle(
-        f"{climb.route.name}: seen from {side}, across and up in W [m]; purple: way of the hand",
-        fontsize=11,
-        parse_math=False,
-    )
+    title = f"{climb.route.name}: seen from {side}, across and up in W [m]; purple: way of the hand"
+    figure.suptitle(title, fontsize=11, parse_math=False)
     return figure
 
 
@@ -137,8 +139,7 @@ def draw_support(climb: Climb, result: RouteResult) -> Figure | None:
         axes.plot(*way.T, "-", color=PICTURE_SETTINGS.asked, linewidth=1.2)
         axes.plot(*way[0], "o", color="white", markeredgecolor="black", markersize=5)
         axes.plot(*way[-1], "o", color=PICTURE_SETTINGS.asked, markersize=4)
-        margin = region.margin
-        room = "no region"
+        room, margin = "no region", region.margin
         if margin is not None:
             room = f"{1e3 * abs(margin):.0f} mm {'inside' if margin >= 0.0 else 'outside'}"
         axes.set_title(f"{_title(knot, result)}\n{room}", fontsize=8)
@@ -148,12 +149,10 @@ def draw_support(climb: Climb, result: RouteResult) -> Figure | None:
     across, up = (axis_words(axis) for axis in regions[0].axes)
     figure.supxlabel(f"{across} of W [m]", fontsize=9)
     figure.supylabel(f"{up} of W [m]", fontsize=9)
-    figure.suptitle(
-        f"{climb.route.name}: where the centre of mass may be, across gravity\n"
-        "way from the stage before (white) to the stage (black); squares: hands, empty in the air",
-        fontsize=11,
-        parse_math=False,
-    )
+    title = f"{climb.route.name}: where the centre of mass may be, across gravity"
+    dots = "way from the stage before (white) to the stage (black)"
+    text = f"{title}\n{dots}; squares: hands, empty in the air"
+    figure.suptitle(text, fontsize=11, parse_math=False)
     return figure
 
 
@@ -184,35 +183,23 @@ def plot_wall(found: FoundClimb, rock: Mesh, rock_pose: Pose, path: Path) -> Non
     up = np.eye(6)[2:3]
     lifts = wall.screening.hands.supports(up)[:, 0] * WRENCH_UNIT[2]
     places = flat([each.pose for each in wall.places])
-    shown = axes.scatter(
-        *places.T, c=lifts, cmap="viridis", s=26, edgecolors="white", linewidths=0.4
-    )
+    style: dict[str, Any] = {"cmap": "viridis", "edgecolors": "white", "linewidths": 0.4}
+    shown = axes.scatter(*places.T, c=lifts, s=26, **style)
     figure.colorbar(shown, ax=axes, label="largest force upward of a hand [N]", shrink=0.8)
     axes.plot(*flat(wall.bodies).T, "k+", markersize=5, label="poses of the body")
     climb, deciding = found.climb, found.deciding
     if climb is not None:
-        for i, limb in enumerate(wall.robot.limbs):
-            route = climb.route
-            hands = [*route.start.hands, *(move.hand for move in route.moves)]
+        hands = [*climb.route.start.hands, *(move.hand for move in climb.route.moves)]
+        for limb, colour in zip(wall.robot.limbs, cycle(SERIES_COLOURS), strict=False):
             own = flat([hand.pose for hand in hands if hand.limb == limb])
-            style: dict[str, Any] = {
-                "color": SERIES_COLOURS[i % len(SERIES_COLOURS)],
-                "markersize": 9,
-                "markerfacecolor": "none",
-            }
+            style = {"color": colour, "markersize": 9, "markerfacecolor": "none"}
             axes.plot(*own.T, "o-", label=limb.replace("_", " "), **style)
         bodies = flat([knot.body for knot in climb.knots])
         axes.plot(*bodies.T, "--", color="black", linewidth=1.2, label="the body")
         axes.plot(*bodies[0], "s", color="black", markersize=5)
     if deciding is not None:
         at = flat([wall.places[place].pose for place in deciding.placements.values()])
-        axes.plot(
-            *at.T,
-            "*",
-            color=COLOUR_OF["red"],
-            markersize=13,
-            label="hands of the deciding stage",
-        )
+        axes.plot(*at.T, **DECIDING_STYLE, label="hands of the deciding stage")
         axes.plot(*flat([wall.bodies[deciding.body]]).T, "P", color=COLOUR_OF["red"], markersize=8)
     axes.set(aspect="equal", xlabel="across [m]", ylabel="up the rock [m]")
     axes.locator_params(axis="x", nbins=5)  # more numbers of a narrow wall would touch
@@ -228,20 +215,13 @@ def _draw_factors(axes: Any, found: FoundClimb) -> None:
         label = f"no climb has more in all stages: {found.bound:.3f}"
         axes.axhline(found.bound, color=COLOUR_OF["red"], linestyle="--", label=label)
     if found.result is not None:
-        factors = [p.load_factor for p in found.result.plans]
-        known = [np.nan if factor is None else factor for factor in factors]
+        known = np.array([plan.load_factor for plan in found.result.plans], float)
         axes.plot(known, ".-", color="black", label="stages as planned")
     if found.deciding is not None:
         here = found.deciding.stage, found.deciding.load_factor
-        axes.plot(
-            *here, "*", color=COLOUR_OF["red"], markersize=13, label=f"decides: {here[1]:.3f}"
-        )
+        axes.plot(*here, **DECIDING_STYLE, label=f"decides: {here[1]:.3f}")
     if found.result is None:
-        said = {
-            "none": "proven: no climb holds enough",
-            "blocked": "no moves of a climb have a plan",
-        }
-        words = said.get(found.status, "no climb was found in time")
+        words = NOT_FOUND.get(found.status, "no climb was found in time")
         axes.text(0.5, 0.5, words, ha="center", transform=axes.transAxes)
     axes.axhline(1.0, color="0.6", linewidth=0.8)
     axes.xaxis.get_major_locator().set_params(integer=True)
@@ -256,23 +236,22 @@ def _draw_factors(axes: Any, found: FoundClimb) -> None:
 def _draw_margins(axes: Any, climb: Climb) -> None:
     """Draw utilisations of knots and the bounds between them, with phases and moves."""
     times = np.array([knot.time for knot in climb.knots])
-    phases: tuple[str, ...] = get_args(KnotPhase)
+    red, phases = COLOUR_OF["red"], get_args(KnotPhase)
     # light, so that curves are seen on them
     tints = colormaps["YlGnBu"](np.linspace(0.0, 0.5, len(phases)))
     named: set[str] = set()
     for before, knot in pairwise(climb.knots):
-        colour = tints[phases.index(knot.phase)]
-        label = None if knot.phase in named else knot.phase
+        ends, colour = (before.time, knot.time), tints[phases.index(knot.phase)]
+        label: str | None = None if knot.phase in named else knot.phase
         named.add(knot.phase)
-        axes.axvspan(before.time, knot.time, color=colour, linewidth=0.0, label=label)
+        axes.axvspan(*ends, color=colour, linewidth=0.0, label=label)
         if knot.bound is not None:
-            ends = [before.time, knot.time]
-            style = {} if knot.index != climb.knots[1].index else {"label": "bound between knots"}
-            axes.plot(ends, [knot.bound] * 2, color=COLOUR_OF["red"], linewidth=1.5, **style)
+            label = "bound between knots" if knot.index == climb.knots[1].index else None
+            axes.plot(ends, [knot.bound] * 2, color=red, linewidth=1.5, label=label)
     used = [knot.utilisation for knot in climb.knots]
     axes.plot(times, used, ".-", color="black", linewidth=1.0, markersize=4, label="knots")
     cap = climb.route.limits.utilisation
-    axes.axhline(cap, color=COLOUR_OF["red"], linestyle="--", label=f"limit {cap:g}")
+    axes.axhline(cap, color=red, linestyle="--", label=f"limit {cap:g}")
     top = 1.15 * max(cap, *used, *(knot.bound or 0.0 for knot in climb.knots))
     begun = 0.0
     for number, group in groupby(climb.knots, key=lambda knot: knot.move):
@@ -284,11 +263,9 @@ def _draw_margins(axes: Any, climb: Climb) -> None:
         begun = end
     if climb.failure is not None:
         text = textwrap.fill(f"move {climb.failure.move} fails: {climb.failure.reason}", 60)
-        box = {"facecolor": "white", "edgecolor": COLOUR_OF["red"]}
-        axes.text(
-            0.98, 0.05, text, transform=axes.transAxes, ha="right", va="bottom",
-            multialignment="left", fontsize=8, bbox=box,
-        )  # fmt: skip
+        style: dict[str, Any] = {"ha": "right", "va": "bottom", "fontsize": 8}
+        style |= {"multialignment": "left", "bbox": {"facecolor": "white", "edgecolor": red}}
+        axes.text(0.98, 0.05, text, transform=axes.transAxes, **style)
     axes.set(xlabel="time [s]", ylabel="utilisation [1]", ylim=(0.0, top))
     axes.set_xlim(times[0], max(times[-1], times[0] + 1e-3))
     axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=10, frameon=False)
@@ -338,8 +315,7 @@ def _title(knot: Knot, result: RouteResult) -> str:
 def _since_stage(climb: Climb, knot: Knot) -> Sequence[Knot]:
     """Return the knots from the stage before to a stage."""
     staged = [each.index for each in climb.knots if each.stage is not None]
-    before = [index for index in staged if index < knot.index]
-    first = before[-1] if before else knot.index
+    first = max((index for index in staged if index < knot.index), default=knot.index)
     return [each for each in climb.knots if first <= each.index <= knot.index]
 
 
@@ -349,10 +325,6 @@ def _swing_to(climb: Climb, knot: Knot) -> Sequence[Knot]:
     limb = knot.limb
     air = [k.index for k in own for h in k.hands if h.limb == limb and not h.on_rock]
     return [each for each in own if air and each.index >= air[0]]
-
-
-def _hand(knot: Knot, limb: str | None) -> Array:
-    return next(hand.pose.position for hand in knot.hands if hand.limb == limb)
 
 
 def _com(climb: Climb, knot: Knot) -> Array:

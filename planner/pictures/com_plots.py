@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from hand_models.base import COLOUR_OF, Array, write_picture
+from hand_models.base import COLOUR_OF, Array, panel_grid, write_picture
 from planner.capability import BodySpace, ComRegion, ComSolid
 from planner.pictures.body_plots import draw_polygon
 from planner.pictures.settings import PICTURE_SETTINGS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 __all__ = ["axis_words", "draw_com_region", "plot_com_region"]
 
@@ -58,8 +58,7 @@ def draw_com_region(
     accelerations: int = 0,
 ) -> Figure:
     """Return the figure of `plot_com_region`."""
-    figure = Figure(figsize=(7.2, 7.2), layout="constrained")
-    axes = figure.subplots()
+    figure, (axes,) = panel_grid(1, 1, (7.2, 7.2))
     margin = region.margin
     if region.polygon is None or margin is None:
         about = "no centre of mass is held"
@@ -79,23 +78,16 @@ def draw_com_region(
     for place, limbs in named.items():
         # away from the centre of mass, and readable across the border
         above = place[1] >= height
-        label = axes.annotate(
-            ", ".join(limbs),
-            place,
-            xytext=(0.0, 8.0 if above else -8.0),
-            textcoords="offset points",
-            ha="center",
-            va="bottom" if above else "top",
-            fontsize=8,
-            color=PICTURE_SETTINGS.limb,
-        )
+        style: dict[str, Any] = {"ha": "center", "fontsize": 8, "color": PICTURE_SETTINGS.limb}
+        style |= {"xytext": (0.0, 8.0 if above else -8.0), "textcoords": "offset points"}
+        style["va"] = "bottom" if above else "top"
+        label = axes.annotate(", ".join(limbs), place, **style)
         label.set_path_effects([withStroke(linewidth=3.0, foreground="white")])
     axes.plot([], [], "s", color=PICTURE_SETTINGS.limb, label="hands")
     origin = region.axes @ space.question.stance.body.position
     axes.plot(*origin, "+", color="0.4", markersize=9, label="origin of B")
     held = margin is not None and margin >= 0.0
-    if accelerations:
-        held = held and solid is not None and solid.margin >= 0.0
+    held = held and (not accelerations or (solid is not None and solid.margin >= 0.0))
     mark, asked = "o" if held else "x", PICTURE_SETTINGS.asked
     axes.plot(*(region.axes @ region.com), mark, color=asked, label="centre of mass asked for")
     across, up = (axis_words(axis) for axis in region.axes)
@@ -104,12 +96,12 @@ def draw_com_region(
     axes.margins(0.12)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=3)
-    seen = "seen against gravity and acceleration" if _moves(space) else "seen from above"
+    moves = np.any(space.question.load.acceleration)
+    seen = "seen against gravity and acceleration" if moves else "seen from above"
     if not space.exact:
         about += "; moving hands' sets linearised where the plan puts their wrists"
-    figure.suptitle(
-        f"{title}: where the centre of mass may be, {seen}\n{about}", fontsize=11, parse_math=False
-    )
+    text = f"{title}: where the centre of mass may be, {seen}\n{about}"
+    figure.suptitle(text, fontsize=11, parse_math=False)
     return figure
 
 
@@ -119,18 +111,14 @@ def _draw_solid(axes: Axes, region: ComRegion, solid: ComSolid | None, accelerat
         return f"nothing is held under these {accelerations} accelerations"
     corners = solid.section(region)
     if corners is not None:
-        outline = np.vstack([corners, corners[:1]])
+        outline, colour = np.vstack([corners, corners[:1]]), COLOUR_OF["purple"]
         label = f"held under {accelerations} accelerations, at its height"
-        axes.fill(
-            *corners.T, facecolor="none", edgecolor=COLOUR_OF["purple"], hatch="//", alpha=0.4
-        )
-        axes.plot(*outline.T, color=COLOUR_OF["purple"], label=label)
+        axes.fill(*corners.T, facecolor="none", edgecolor=colour, hatch="//", alpha=0.4)
+        axes.plot(*outline.T, color=colour, label=label)
     inside = "inside" if solid.margin >= 0.0 else "outside"
     height = "" if corners is not None else ", which does not reach its height"
-    return (
-        f"{1e3 * abs(solid.margin):.0f} mm {inside} the solid that is held under "
-        f"{accelerations} accelerations{height}"
-    )
+    what = f"the solid that is held under {accelerations} accelerations{height}"
+    return f"{1e3 * abs(solid.margin):.0f} mm {inside} {what}"
 
 
 def axis_words(axis: Array) -> str:
@@ -139,7 +127,3 @@ def axis_words(axis: Array) -> str:
     if np.allclose(np.abs(axis), np.eye(3)[part], rtol=0.0, atol=1e-9):
         return f"{'+' if axis[part] > 0.0 else '−'}{'xyz'[part]}"
     return f"along ({', '.join(f'{value:g}' for value in axis.round(3) + 0.0)})"
-
-
-def _moves(space: BodySpace) -> bool:
-    return bool(np.any(space.question.load.acceleration))

@@ -18,14 +18,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from hand_models.base import COLOUR_OF, Array, write_picture
+from hand_models.base import COLOUR_OF, Array, draw_arrow, write_picture
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, NAIL, SettledHand
 from hand_models.sections import Section
 from hand_models.wrench_spaces import WRENCH_SCALE, WrenchSpace
 from planner.capability import WRENCH_COMPONENTS, SupportPoint, enclose
 from planner.pictures.body_plots import symbol_of
-from planner.pictures.settings import PICTURE_SETTINGS
+from planner.pictures.settings import NOTE_STYLE, PICTURE_SETTINGS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -173,20 +173,17 @@ def _draw_finger(
     finger = settled.fingers[index]
     model = finger.model
     low, high = limits
-    section = settled.hand.section(
-        FINGERS[index], settled.hold, settled.grasp, settled.seating.pose
-    )
+    name, pose = FINGERS[index], settled.seating.pose
+    section = settled.hand.section(name, settled.hold, settled.grasp, pose)
     if section is not None:
         _draw_rock(axes, section, low, high)
-    axes.plot(*1e3 * finger.chain.T, "o-", color="0.25", markersize=5, linewidth=2.0)
+    _draw_line(axes, finger.chain, marker="o", color="0.25", markersize=5, linewidth=2.0)
     _draw_base(axes, settled, index)
     rows = np.flatnonzero(settled.finger_of == index)
     tiles = dict(zip([settled.tiles[i].phalanx for i in rows], rows.tolist(), strict=True))
     for phalanx, contact in zip(PHALANGES, finger.contacts, strict=True):
-        ends = [
-            replace(contact, along=a, rise=0.0).point(model.tile_height) for a in model.tile_range
-        ]
-        _draw_tile(axes, contact.kind, ends, linewidth=4, solid_capstyle="butt")
+        flush = [replace(contact, along=along, rise=0.0) for along in model.tile_range]
+        _draw_tile(axes, contact.kind, [end.point(model.tile_height) for end in flush])
         if contact.kind != "none":
             place = 1e3 * np.array(contact.point(model.tile_height))
             _draw_force(axes, place, contact.angle, loads[tiles[phalanx]], largest)
@@ -194,27 +191,17 @@ def _draw_finger(
         row, angle = tiles[NAIL], float(settled.nail_angles[index])
         reach = settled.hand.nail.length * np.array([math.cos(angle), math.sin(angle)])
         kind = settled.tiles[row].contact
-        _draw_tile(axes, kind, [finger.pin, finger.pin + reach], linewidth=3)
+        colour = CONTACT_STYLES[kind][0]
+        _draw_line(axes, [finger.pin, finger.pin + reach], color=colour, linewidth=3)
         if kind == NAIL:
             away = settled.positions[row] - frame.joint
             place = 1e3 * np.array([away @ frame.along, away[2]])
             _draw_force(axes, place, angle, loads[row], largest)
-    axes.annotate(
-        "",
-        (low[0] + 8.0 + PICTURE_SETTINGS.longest_force, low[1] + 8.0),
-        (low[0] + 8.0, low[1] + 8.0),
-        arrowprops={"arrowstyle": "-|>", "color": COLOUR_OF["red"]},
-    )
-    axes.text(
-        low[0] + 8.0,
-        low[1] + 11.0,
-        f"{largest:.0f} N",
-        va="top",
-        color=COLOUR_OF["red"],
-        fontsize=8,
-    )
+    red, (x, y), length = COLOUR_OF["red"], low + 8.0, PICTURE_SETTINGS.longest_force
+    draw_arrow(axes, (x, y), (x + length, y), red, shrinkA=2.0, shrinkB=2.0)
+    axes.text(x, y + 3.0, f"{largest:.0f} N", va="top", color=red, fontsize=8)
     axes.set(
-        title=f"{FINGERS[index].replace('_', ' ')}: plane {direction_in_words(frame.along)}",
+        title=f"{name.replace('_', ' ')}: plane {direction_in_words(frame.along)}",
         xlabel="along the finger, from its proximal joint [mm]",
         ylabel="into the rock, from the joint [mm]",
         xlim=(low[0], high[0]),
@@ -225,9 +212,14 @@ def _draw_finger(
     axes.set_aspect("equal", adjustable="box")
 
 
-def _draw_tile(axes: Axes, kind: str, ends: Sequence[ArrayLike], **style: Any) -> None:
-    """Draw a tile or a nail, from end to end in (x, z) of F [m], in the colour of its contact."""
-    axes.plot(*(1e3 * np.array(ends)).T, color=CONTACT_STYLES[kind][0], **style)
+def _draw_line(axes: Axes, points: Any, **style: Any) -> None:
+    """Draw a line through points in (x, z) of F [m], on axes in millimetres."""
+    axes.plot(*1e3 * np.transpose(points), **style)
+
+
+def _draw_tile(axes: Axes, kind: str, ends: Sequence[ArrayLike]) -> None:
+    """Draw a tile, from end to end in (x, z) of F [m], in the colour of its contact."""
+    _draw_line(axes, ends, color=CONTACT_STYLES[kind][0], linewidth=4, solid_capstyle="butt")
 
 
 def _draw_rock(axes: Axes, section: Section, low: Array, high: Array) -> None:
@@ -243,20 +235,14 @@ def _draw_base(axes: Axes, settled: SettledHand, index: int) -> None:
     """Draw the tile on an outer finger's base, or the palm behind an inner finger."""
     hand = settled.hand
     if FINGERS[index].startswith("inner"):
-        place = -1e3 * hand.inner_joint[[0, 2]]
-        half = 1e3 * 0.5 * hand.palm_length
-        axes.plot(
-            place[0] + np.array([-half, half]), [place[1]] * 2, color=PICTURE_SETTINGS.palm, lw=3
-        )
+        (x, z), half = -hand.inner_joint[[0, 2]], 0.5 * hand.palm_length
+        _draw_line(axes, [(x - half, z), (x + half, z)], color=PICTURE_SETTINGS.palm, lw=3)
         return
     tile = next(t for t, row in zip(settled.tiles, settled.finger_of, strict=True) if row == index)
-    middle = 1e3 * (hand.base_tile_reach - hand.outer_reach)
-    half = 1e3 * 0.5 * hand.finger.tile_length
-    height = 1e3 * (hand.base_tile_surface - hand.outer_axis[2])
-    colour = CONTACT_STYLES[tile.contact][0]
-    axes.plot([middle - half, middle + half], [height] * 2, color=colour, lw=4,
-              solid_capstyle="butt")  # fmt: skip
-    axes.plot([-1e3 * hand.outer_reach, 0.0], [0.0, 0.0], color="0.25", lw=2.0)
+    middle, half = hand.base_tile_reach - hand.outer_reach, 0.5 * hand.finger.tile_length
+    height = hand.base_tile_surface - hand.outer_axis[2]
+    _draw_tile(axes, tile.contact, [(middle - half, height), (middle + half, height)])
+    _draw_line(axes, [(-hand.outer_reach, 0.0), (0.0, 0.0)], color="0.25", lw=2.0)
 
 
 def _draw_force(axes: Axes, place: Array, angle: float, load: Array, largest: float) -> None:
@@ -266,10 +252,7 @@ def _draw_force(axes: Axes, place: Array, angle: float, load: Array, largest: fl
     force = -load[0] * u + load[1] * np.array([-u[1], u[0]])
     end = place + PICTURE_SETTINGS.longest_force * force / largest
     if np.hypot(*force) > 0.02 * largest:
-        axes.annotate(
-            "", tuple(end), tuple(place),
-            arrowprops={"arrowstyle": "-|>", "color": COLOUR_OF["red"], "shrinkA": 0, "shrinkB": 0},
-        )  # fmt: skip
+        draw_arrow(axes, place, end, COLOUR_OF["red"])
 
 
 def direction_in_words(along: Array) -> str:
@@ -309,49 +292,33 @@ def _draw_from_above(axes: Axes, settled: SettledHand) -> None:
         step = max(1, math.ceil((float(depth.max()) - low) / 15))
         levels = low + step * np.arange(15 + 1)
         shades = axes.contourf(1e3 * y, 1e3 * x, depth, levels=levels, cmap="Greys", alpha=0.6)
-        axes.figure.colorbar(
-            shades, ax=axes, label="z of H of the rock [mm]", location="bottom", shrink=0.8
-        )
-    size = 1e3 * hand.palm_tile_size
+        bar: dict[str, Any] = {"location": "bottom", "shrink": 0.8}
+        axes.figure.colorbar(shades, ax=axes, label="z of H of the rock [mm]", **bar)
+
+    def seen(points: Array) -> Array:
+        """Return points in H [m] across and up the picture [mm]."""
+        return 1e3 * points[..., [1, 0]]
+
+    size = seen(hand.palm_tile_size)
     for i, tile in enumerate(hand.palm_tiles):
-        corner = 1e3 * tile[[1, 0]] - 0.5 * size[::-1]
+        corner = seen(tile) - 0.5 * size
         colour = CONTACT_STYLES["face" if i in settled.palm.engaged else "none"][0]
-        axes.add_patch(Rectangle(tuple(corner), *size[::-1], facecolor=colour, alpha=0.6, ec="0.3"))
+        axes.add_patch(Rectangle(tuple(corner), *size, facecolor=colour, alpha=0.6, ec="0.3"))
     frames = hand.frames(settled.grasp.outer_rotation)
     for name, frame, finger in zip(FINGERS, frames, settled.fingers, strict=True):
-        ends = 1e3 * (frame.joint + np.outer([-0.06, 0.16], frame.along))
-        axes.plot(ends[:, 1], ends[:, 0], "--", color=COLOUR_OF["blue"], lw=1.0)
-        places = 1e3 * frame.joint + np.outer(1e3 * finger.chain[:, 0], frame.along)
-        axes.plot(places[:, 1], places[:, 0], "o-", color="0.25", markersize=4, lw=2.5)
+        ends = frame.joint + np.outer([-0.06, 0.16], frame.along)
+        axes.plot(*seen(ends).T, "--", color=COLOUR_OF["blue"], lw=1.0)
+        places = seen(frame.joint + np.outer(finger.chain[:, 0], frame.along))
+        axes.plot(*places.T, "o-", color="0.25", markersize=4, lw=2.5)
         outward = places[-1] - places[0]
-        axes.annotate(
-            name.replace("_", "\n"),
-            (places[-1, 1], places[-1, 0]),
-            xytext=tuple(18.0 * outward[[1, 0]] / max(float(np.hypot(*outward[:2])), 1.0)),
-            textcoords="offset points",
-            color=COLOUR_OF["blue"],
-            fontsize=8,
-            ha="center",
-            va="center",
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0},
-        )
+        shift = tuple(18.0 * outward / max(float(np.hypot(*outward)), 1.0))
+        style = NOTE_STYLE | {"color": COLOUR_OF["blue"], "textcoords": "offset points"}
+        axes.annotate(name.replace("_", "\n"), tuple(places[-1]), xytext=shift, **style)
     for tile, place in zip(settled.tiles, settled.positions, strict=True):
-        axes.plot(
-            1e3 * place[1],
-            1e3 * place[0],
-            "o",
-            color=CONTACT_STYLES[tile.contact][0],
-            ms=6,
-            mec="k",
-        )
-    axes.set(
-        title="from the arm, into the rock; green palm tiles are engaged",
-        xlabel="y of H [mm]",
-        ylabel="x of H [mm]",
-        xlim=1e3 * (centre[1] + np.array([-around, around])),
-        ylim=1e3 * (centre[0] + np.array([-around, around])),
-    )
-    axes.title.set_fontsize(10)
+        axes.plot(*seen(place), "o", color=CONTACT_STYLES[tile.contact][0], ms=6, mec="k")
+    (left, bottom), (right, top) = seen(centre - around), seen(centre + around)
+    axes.set(xlabel="y of H [mm]", ylabel="x of H [mm]", xlim=(left, right), ylim=(bottom, top))
+    axes.set_title("from the arm, into the rock; green palm tiles are engaged", fontsize=10)
     axes.set_aspect("equal", adjustable="box")
 
 
@@ -389,8 +356,7 @@ def _draw_projection(axes: Axes, points: Array, i: int, j: int) -> None:
     )
     # a set narrower than this along an axis is drawn as a line [N] or [N·m]
     flat = 1e-6
-    if np.ptp(points[:, 0]) < flat:
-        axes.set_xlim(points[0, 0] - 1.0, points[0, 0] + 1.0)
-    if np.ptp(points[:, 1]) < flat:
-        axes.set_ylim(points[0, 1] - 1.0, points[0, 1] + 1.0)
+    for name, values in zip(("xlim", "ylim"), points.T, strict=True):
+        if np.ptp(values) < flat:
+            axes.set(**{name: (values[0] - 1.0, values[0] + 1.0)})
     axes.grid(alpha=0.3)

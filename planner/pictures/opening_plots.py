@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 
 from hand_models.base import COLOUR_OF, SERIES_COLOURS, write_picture
+from planner.capability import WRENCH_COMPONENTS
 
 if TYPE_CHECKING:
     from hand_models.opening import HandPath
@@ -32,13 +33,11 @@ def plot_opening(opening: HandPath, path: Path, title: str) -> None:
         3, 1, sharex=True, height_ratios=(3.0, 2.0, 1.0 + 0.22 * len(names))
     )
     tension = opening.tensions[:, 0]
-    for axes, first, names_of, unit in (
-        (forces, 0, ("fx", "fy", "fz"), "force on the rock, in H [N]"),
-        (moments, 3, ("mx", "my", "mz"), "moment [N·m]"),
-    ):
-        for k, component in enumerate(names_of, first):
-            style: dict[str, Any] = {"color": SERIES_COLOURS[k % 3], "marker": "os^"[k % 3]}
-            axes.plot(tension, opening.wrenches[:, k], markersize=4, label=component, **style)
+    for k, component in enumerate(WRENCH_COMPONENTS):
+        style: dict[str, Any] = {"color": SERIES_COLOURS[k % 3], "marker": "os^"[k % 3]}
+        axes = forces if k < 3 else moments
+        axes.plot(tension, opening.wrenches[:, k], markersize=4, label=component, **style)
+    for axes, unit in ((forces, "force on the rock, in H [N]"), (moments, "moment [N·m]")):
         axes.set_ylabel(unit)
         axes.axhline(0.0, color="0.7", linewidth=0.8)
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 from mpl_toolkits.mplot3d import proj3d
@@ -30,12 +29,13 @@ from planner.pictures.plan_scene import (
 )
 from planner.pictures.plan_tables import (
     draw_answers,
+    draw_bar,
     draw_joints,
     draw_shortfall,
     draw_spread,
     draw_tiles,
 )
-from planner.pictures.plan_views import UTILISATION_COLOURS, UTILISATION_NORM, View, draw_scene
+from planner.pictures.plan_views import View, draw_scene
 from planner.question import Question
 from planner.result import Plan
 
@@ -87,9 +87,8 @@ def draw_plan(plan: Plan, question: Question) -> Figure:
     sides = figure.add_gridspec(2, 1, left=0.425, right=0.605, hspace=0.3, **places)
     _draw_sides(figure.add_subplot(sides[0]), figure.add_subplot(sides[1]), scene, seen)
     parts = (max(rows, 4), len(joints) + 0.5) if joints else (1.0,)
-    tables = figure.add_gridspec(
-        len(parts), 1, left=0.75, right=0.93, height_ratios=parts, hspace=0.3, **places
-    )
+    places |= {"left": 0.75, "right": 0.93, "hspace": 0.3}
+    tables = figure.add_gridspec(len(parts), 1, height_ratios=parts, **places)
     if plan.hands:
         draw_tiles(figure.add_subplot(tables[0]), plan, question)
     else:
@@ -97,12 +96,8 @@ def draw_plan(plan: Plan, question: Question) -> Figure:
     if joints:
         draw_joints(figure.add_subplot(tables[1]), joints)
     if plan.hands:
-        figure.colorbar(
-            ScalarMappable(UTILISATION_NORM, UTILISATION_COLOURS),
-            cax=figure.add_axes((0.94, 0.3, 0.01, 0.4)),
-            label="utilisation: load / capacity [1]",
-            extend="max",
-        )
+        own = figure.add_axes((0.94, 0.3, 0.01, 0.4))
+        draw_bar(figure, "utilisation: load / capacity [1]", cax=own)
     _write_title(figure, plan)
     return figure
 
@@ -166,14 +161,12 @@ def _draw_sides(facing: Any, side: Any, scene: DrawnScene, seen: ViewDirections)
     """Draw the scene facing the rock, and from the side."""
     ahead = "toward the rock" if seen.toward else "ahead"
     _draw_side(side, scene, seen.ahead, WORLD_UP, (ahead, "up"), "the side")
+    up, word, seen_from = WORLD_UP, "up", "behind"
+    right = np.cross(seen.ahead, WORLD_UP)
     if seen.steep:
-        below = seen.into[2] > 0.0
-        right = np.cross(WORLD_UP if below else -WORLD_UP, seen.ahead)
-        seen_from = "below" if below else "above"
-        _draw_side(facing, scene, right, seen.ahead, ("to the right", ahead), seen_from)
-    else:
-        right = np.cross(seen.ahead, WORLD_UP)
-        _draw_side(facing, scene, right, WORLD_UP, ("to the right", "up"), "behind")
+        up, word, seen_from = seen.ahead, ahead, "below" if seen.into[2] > 0.0 else "above"
+        right *= -1.0 if seen_from == "below" else 1.0
+    _draw_side(facing, scene, right, up, ("to the right", word), seen_from)
 
 
 def _draw_side(

@@ -18,7 +18,7 @@ from hand_models.rock import Triangles, grid
 from planner.pictures.rock_patches import rock_patch
 from planner.prepare import settle_hand
 from planner.question import HandOnHold, Question, Stance
-from planner.result import Plan
+from planner.result import HandPlan, Plan
 
 __all__ = [
     "WORLD_UP",
@@ -249,6 +249,7 @@ def drawn_scene(
         surfaces += _rocks(stance.hands, settled)
     lines: list[Line] = []
     dots: list[Dots] = []
+    labels: list[Label] = []
     for hand, known in zip(stance.hands, settled, strict=True):
         kind, into_world = known.hand, hand.pose.apply
         x, y = np.abs(kind.palm_tiles[:, :2]).max(axis=0) + kind.palm_tile_size / 2.0
@@ -260,25 +261,18 @@ def drawn_scene(
             for frame, finger in zip(frames, known.fingers, strict=True)
         ]
         dots.append(Dots("contact", into_world(known.positions[known.holding])))
-    names = {
-        hand.limb: hand.limb + " (floats)" * (hand.wrist == "floating") for hand in stance.hands
-    }
-    labels = {hand.limb: hand.pose.position for hand in stance.hands}
+        floats = " (floats)" * (hand.wrist == "floating")
+        labels.append(Label("limb", hand.pose.position, hand.limb.replace("_", " ") + floats))
     if plan.joints is not None:
-        used = joint_utilisations(plan, stance)
+        used, held = joint_utilisations(plan, stance), {hand.limb for hand in stance.hands}
         for limb in stance.robot.limbs:
             chain = stance.body.apply(stance.robot.link_chain(plan.joints, limb))
             lines.append(Line("limb", chain))
             dots.append(Dots("joint", chain[:-1], used.get(limb)))
-            if limb not in labels:
-                names[limb], labels[limb] = f"{limb} (free)", chain[-1]
+            if limb not in held:
+                labels.append(Label("limb", chain[-1], f"{limb.replace('_', ' ')} (free)"))
     plans = {hand.limb: hand for hand in plan.hands or ()}
-    arrows = []
-    for hand in stance.hands:
-        if (planned := plans.get(hand.limb)) is not None:
-            force = -hand.pose.rotation @ planned.wrench[:3]
-            size = f"{np.linalg.norm(force):.0f} N"
-            arrows.append(Arrow("force", hand.pose.position, force, size, planned.utilisation))
+    arrows = [_force(hand, plans[hand.limb]) for hand in stance.hands if hand.limb in plans]
     load, origin = _load(plan, question), stance.body.position
     return DrawnScene(
         origin=origin,
@@ -286,10 +280,7 @@ def drawn_scene(
         lines=tuple(lines),
         dots=(*dots, Dots("load", load.start[None]), Dots("origin", origin[None])),
         arrows=(*arrows, load),
-        labels=(
-            *(Label("limb", labels[limb], name.replace("_", " ")) for limb, name in names.items()),
-            Label("origin", origin, "B"),
-        ),
+        labels=(*labels, Label("origin", origin, "B")),
     )
 
 
@@ -330,7 +321,7 @@ def _rocks(hands: Sequence[HandOnHold], settled: Sequence[SettledHand]) -> list[
     for i, (hand, known) in enumerate(zip(hands, settled, strict=True)):
         if any(alike(i, j) for j in range(i)):
             continue
-        there = [hands[j].pose.position for j in range(len(hands)) if j == i or alike(i, j)]
+        there = [other.pose.position for j, other in enumerate(hands) if alike(i, j)]
         patch = rock_patch(known, hand.pose.inverse().apply(np.array(there)))
         corners = hand.pose.apply(patch.reshape(-1, 3))
         apart = np.arange(len(corners)).reshape(-1, 3)
@@ -352,11 +343,10 @@ def _body(
         ends, radii = robot.placed_capsules(plan.joints), robot.capsules.radii
         kinds += ["link"] * (len(ends) - len(kinds))
     placed = stance.body.apply(ends.reshape(-1, 3)).reshape(-1, 2, 3)
+    parts = zip(kinds, placed, radii.tolist(), robot.capsules.joints, strict=False)
     found = [
         DrawnSurface(kind, "", *_capsule(start, end, radius, fineness))
-        for kind, (start, end), radius, joint in zip(
-            kinds, placed, radii.tolist(), robot.capsules.joints[: len(kinds)], strict=True
-        )
+        for kind, (start, end), radius, joint in parts
         if joint not in without
     ]
     if "body" not in kinds and not without:
@@ -380,6 +370,13 @@ def _capsule(start: Array, end: Array, radius: float, count: int) -> Triangles:
     half = np.sin(rise)[:, None, None] * around, np.cos(rise)[:, None, None] * along
     beyond, before = half[0] + half[1], (half[0] - half[1])[::-1]
     return grid(np.concatenate([end + radius * beyond, start + radius * before]))
+
+
+def _force(hand: HandOnHold, planned: HandPlan) -> Arrow:
+    """Return the force of the rock on a hand."""
+    force = -hand.pose.rotation @ planned.wrench[:3]
+    size = f"{np.linalg.norm(force):.0f} N"
+    return Arrow("force", hand.pose.position, force, size, planned.utilisation)
 
 
 def _load(plan: Plan, question: Question) -> Arrow:

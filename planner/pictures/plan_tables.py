@@ -5,19 +5,46 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import to_rgba
 
 from hand_models.base import COLOUR_OF, Array
 from hand_models.hand import NAIL
 from planner.explanation import constraint_words, part_words
-from planner.pictures.plan_views import UTILISATION_COLOURS, UTILISATION_NORM, ink_on
+from planner.pictures.plan_views import UTILISATION_COLOURS, UTILISATION_NORM, colour_of, ink_on
+from planner.pictures.settings import CENTRED_TEXT
 from planner.question import Question
 from planner.result import SPREAD_SETTINGS, Certificate, LimitName, Plan, Spread
 
-__all__ = ["draw_answers", "draw_joints", "draw_shortfall", "draw_spread", "draw_tiles"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "draw_answers",
+    "draw_bar",
+    "draw_joints",
+    "draw_shortfall",
+    "draw_spread",
+    "draw_tiles",
+]
+
+
+def draw_bar(figure: Figure, label: str, **place: Any) -> None:
+    """Draw the bar that says what the colours of utilisations mean.
+
+    Parameters
+    ----------
+    figure : Figure
+    label : str
+        Label of the bar.
+    **place
+        Of matplotlib's ``Figure.colorbar``: the axes beside which the bar is, or its own.
+    """
+    shades = ScalarMappable(UTILISATION_NORM, UTILISATION_COLOURS)
+    figure.colorbar(shades, label=label, extend="max", **place)
 
 
 def draw_tiles(axes: Any, plan: Plan, question: Question) -> None:
@@ -47,16 +74,13 @@ def draw_tiles(axes: Any, plan: Plan, question: Question) -> None:
         for finger in hand.fingers:
             touching = (tile for tile in finger.tiles if tile.contact != "none")
             used = {tile.phalanx: tile.utilisation for tile in touching}
+            tension = finger.tendon_tension
+            torque = finger.motor_torque / body.drive.maximum_torque
             tendon = max(
-                finger.tendon_tension / strength,
-                finger.motor_torque / body.drive.maximum_torque,
-                finger.motor_current / body.drive.maximum_current,
+                tension / strength, torque, finger.motor_current / body.drive.maximum_current
             )
             rows.append([*(used.get(phalanx, np.nan) for phalanx in columns), tendon])
-            names.append(
-                f"{hand.limb.replace('_', ' ')}  {finger.name.replace('_', ' ')}"
-                f"  {finger.tendon_tension:3.0f} N"
-            )
+            names.append(f"{hand.limb}  {finger.name}  {tension:3.0f} N".replace("_", " "))
         palm = hand.palm.utilisation if hand.palm.engaged else np.nan
         whole += [(palm, hand.utilisation)] * len(hand.fingers)
     values = np.column_stack([rows, whole])
@@ -93,10 +117,9 @@ def draw_joints(axes: Any, used: Mapping[str, Array]) -> None:
 
 def _draw_colours(axes: Any, values: Array, columns: Iterable[str], rows: Iterable[str]) -> None:
     """Draw numbers as colours; none where a number is NaN."""
+    style: dict[str, Any] = {"cmap": UTILISATION_COLOURS, "norm": UTILISATION_NORM}
     shown = np.ma.masked_invalid(values)
-    axes.imshow(
-        shown, cmap=UTILISATION_COLOURS, norm=UTILISATION_NORM, aspect="auto", interpolation="none"
-    )
+    axes.imshow(shown, aspect="auto", interpolation="none", **style)
     axes.set_xticks(range(values.shape[1]), list(columns), fontsize=8)
     axes.set_yticks(range(values.shape[0]), list(rows), fontsize=8)
     axes.tick_params(length=0)
@@ -109,14 +132,13 @@ def _draw_colours(axes: Any, values: Array, columns: Iterable[str], rows: Iterab
 
 def _write_numbers(axes: Any, values: Array, first: tuple[float, float] = (0.0, 0.0)) -> None:
     """Write numbers that are not NaN on their colours, the first at a row and a column."""
-    style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8}
     for (i, j), value in np.ndenumerate(values):
         if np.isfinite(value):
-            colour = ink_on(UTILISATION_COLOURS(UTILISATION_NORM(value)))
+            colour = ink_on(colour_of(value))
             # as many digits as fit, of what is rounded up, too
             text = f"{value:.{2 if value < 9.995 else 1 if value < 99.95 else 0}f}"
             text = text if value < 999.0 else "999+"
-            axes.text(first[1] + j, first[0] + i, text, color=colour, **style)
+            axes.text(first[1] + j, first[0] + i, text, color=colour, **CENTRED_TEXT)
 
 
 def draw_shortfall(axes: Any, plan: Plan) -> None:
@@ -150,20 +172,13 @@ def draw_shortfall(axes: Any, plan: Plan) -> None:
 
 def _write_wrenches(axes: Any, values: Array, place: tuple[float, float, float, float]) -> None:
     """Write wrenches, shape (6, 3), as a table at a place, whose lines part the rows."""
-    words = [[f"{round(value, 1) + 0.0:.1f}" for value in row] for row in values]
-    table = axes.table(
-        [
-            [name, *row]
-            for name, row in zip(
-                ("fx [N]", "fy [N]", "fz [N]", "mx [N·m]", "my [N·m]", "mz [N·m]"),
-                words,
-                strict=True,
-            )
-        ],
-        colLabels=("", *("needed", "nearest", "missing")),
-        edges="horizontal",
-        bbox=place,
-    )
+    names = ("fx [N]", "fy [N]", "fz [N]", "mx [N·m]", "my [N·m]", "mz [N·m]")
+    rows = [
+        [name, *(f"{round(value, 1) + 0.0:.1f}" for value in row)]
+        for name, row in zip(names, values, strict=True)
+    ]
+    heads = ("", "needed", "nearest", "missing")
+    table = axes.table(rows, colLabels=heads, edges="horizontal", bbox=place)
     table.auto_set_font_size(False)
     table.set_fontsize(8)
     for cell in table.get_celld().values():
@@ -191,7 +206,7 @@ def _lines(names: Sequence[LimitName]) -> list[str]:
     for limb, found in alike.items():
         lines.append(f"{limb.replace('_', ' ')}:")
         for words, owners in found.items():
-            of = ", ".join(owner for owner in owners if owner)
+            of = ", ".join(filter(None, owners))
             text = f"{words} ({of})" if of else words
             lines += textwrap.wrap(text, 64, initial_indent="    ", subsequent_indent="        ")
     most = 24  # lines that say what leaves no balance
@@ -210,8 +225,7 @@ def draw_answers(axes: Any, spread: Spread) -> None:
         Each of its answers is a bar: feasible, overloaded (or dragged) and without balance.
     """
     there = {textwrap.fill(words, 12): each for words, each in spread.answers.items()}
-    holds = np.array([each.holds for each in there.values()])
-    without = np.array([each.without for each in there.values()])
+    holds, without = np.array([(each.holds, each.without) for each in there.values()]).T
     parts = {
         "feasible": (holds, COLOUR_OF["green"]),
         spread.failing: (spread.draws - holds - without, COLOUR_OF["amber"]),
@@ -239,8 +253,8 @@ def _write_counts(axes: Any, row: int, counts: Sequence[int], colours: Sequence[
         middle, begin = begin + 0.5 * count, begin + count
         if not count:
             continue
-        style: dict[str, Any] = {"fontsize": 8, "ha": "center", "va": "center"}
-        text = axes.text(middle, row, str(count), color=ink_on(to_rgba(colour)), **style)
+        ink = ink_on(to_rgba(colour))
+        text = axes.text(middle, row, str(count), color=ink, **CENTRED_TEXT)
         width = text.get_window_extent().width
         if width + gap > per_sample * count:
             middle = max(middle, (edge + gap + 0.5 * width) / per_sample)
@@ -272,7 +286,7 @@ def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
     if spread.load_factor is None:
         return
     low, high = spread.load_factor.low, spread.load_factor.high
-    ends = np.array([*factors, 1.0, *([] if nominal is None else [nominal])])
+    ends = np.array([*factors, 1.0, 1.0 if nominal is None else nominal])
     many = len(factors) >= SPREAD_SETTINGS.many_draws
     axes.axvspan(low, high, color="0.88", label="5 to 95 %" if many else "all")
     axes.hist(factors, np.linspace(ends.min(), ends.max(), 15 + 1), color=COLOUR_OF["blue"])

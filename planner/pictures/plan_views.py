@@ -16,9 +16,17 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from hand_models.base import Array
 from planner.pictures.plan_scene import DrawnScene
-from planner.pictures.settings import PICTURE_SETTINGS
+from planner.pictures.settings import NOTE_STYLE, PICTURE_SETTINGS
 
-__all__ = ["UTILISATION_COLOURS", "UTILISATION_NORM", "View", "draw_scene", "ink_on", "silhouette"]
+__all__ = [
+    "UTILISATION_COLOURS",
+    "UTILISATION_NORM",
+    "View",
+    "colour_of",
+    "draw_scene",
+    "ink_on",
+    "silhouette",
+]
 
 UTILISATION_COLOURS: Final = LinearSegmentedColormap.from_list(
     "load", PICTURE_SETTINGS.utilisation
@@ -29,6 +37,11 @@ UTILISATION_NORM: Final = Normalize(0.0, 1.0)
 """Range of utilisations that the colour map covers: 0 to 1."""
 
 
+def colour_of(utilisation: Any) -> Any:
+    """Return the colours of utilisations, which may be a number or an array."""
+    return UTILISATION_COLOURS(UTILISATION_NORM(utilisation))
+
+
 def ink_on(colour: Any) -> str:
     """Return in which colour text is written on a colour of matplotlib: black or white."""
     red, green, blue = to_rgb(colour)
@@ -37,29 +50,21 @@ def ink_on(colour: Any) -> str:
     return "black" if 0.299 * red + 0.587 * green + 0.114 * blue > middle else "white"
 
 
+LIMB_COLOUR: Final = PICTURE_SETTINGS.limb
+SEEN_THROUGH: Final = (*to_rgb(LIMB_COLOUR), 0.16)
+"""Colour of limbs, and of what is seen through them and the body."""
+
 SCENE_STYLES: Final[dict[str, dict[str, Any]]] = {
     # convex surfaces; hands and rock are seen through the body
     "palm": {"facecolor": "0.7", "edgecolor": "0.2", "linewidth": 1.0, "zorder": 2},
-    **{
-        kind: {
-            "facecolor": (*to_rgb(PICTURE_SETTINGS.limb), 0.16),
-            "edgecolor": edge,
-            "linewidth": 0.5,
-            "zorder": 4,
-        }
-        for kind, edge in (("link", "none"), ("body", PICTURE_SETTINGS.limb))
-    },
+    "link": {"facecolor": SEEN_THROUGH, "edgecolor": "none", "linewidth": 0.5, "zorder": 4},
+    "body": {"facecolor": SEEN_THROUGH, "edgecolor": LIMB_COLOUR, "linewidth": 0.5, "zorder": 4},
     # lines
     "finger": {"color": "0.2", "linewidth": 1.5, "zorder": 3},
-    "limb": {
-        "color": PICTURE_SETTINGS.limb,
-        "linewidth": 4.0,
-        "solid_capstyle": "round",
-        "zorder": 5,
-    },
+    "limb": {"color": LIMB_COLOUR, "linewidth": 4.0, "solid_capstyle": "round", "zorder": 5},
     # dots
     "contact": {"color": "black", "marker": ".", "ms": 4, "zorder": 3},
-    "joint": {"color": "white", "mec": PICTURE_SETTINGS.limb, "marker": "o", "ms": 5, "zorder": 6},
+    "joint": {"color": "white", "mec": LIMB_COLOUR, "marker": "o", "ms": 5, "zorder": 6},
     "load": {"color": PICTURE_SETTINGS.load, "marker": "o", "ms": 8, "zorder": 6},
     "origin": {"color": "black", "marker": "+", "ms": 10, "zorder": 6},
 }
@@ -252,9 +257,7 @@ class View:
         **style
             Text properties of matplotlib.
         """
-        pad = PICTURE_SETTINGS.note_padding
-        box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": pad}
-        style = {"fontsize": 8, "ha": "center", "va": "center", "zorder": 8, "bbox": box, **style}
+        style = {"zorder": 8, **NOTE_STYLE, **style}
         where = (float(spot[0]), float(spot[1]))
         place = {"xytext": shift, "textcoords": "offset points", "annotation_clip": False}
         self.axes.annotate(text, where, **place, **style)
@@ -283,9 +286,7 @@ class View:
             moved = box.padded(PICTURE_SETTINGS.note_padding * point).extents + np.tile(shifts, 2)
             apart = (moved[:, None, :2] >= placed[:, 2:]) | (moved[:, None, 2:] <= placed[:, :2])
             free = apart.any(axis=2).all(axis=1)
-            inside = (moved[:, :2] >= frame.min).all(axis=1) & (moved[:, 2:] <= frame.max).all(
-                axis=1
-            )
+            inside = ((moved[:, :2] >= frame.min) & (moved[:, 2:] <= frame.max)).all(axis=1)
             near = (dots > moved[:, :2].min(axis=0)) & (dots < moved[:, 2:].max(axis=0))
             near = dots[near.all(axis=1)]
             under = (near > moved[:, None, :2]) & (near < moved[:, None, 2:])
@@ -326,7 +327,7 @@ def draw_scene(view: View, scene: DrawnScene, *, noted: bool = True) -> None:
             view.dots(dots.points, **SCENE_STYLES[dots.kind])
             continue
         for i in np.argsort(dots.utilisations, kind="stable"):
-            colour = UTILISATION_COLOURS(UTILISATION_NORM(dots.utilisations[i]))
+            colour = colour_of(dots.utilisations[i])
             style = SCENE_STYLES[dots.kind] | {"color": colour, "mec": "0.2", "ms": 6}
             view.dots(dots.points[i : i + 1], **style)
     if noted:
@@ -375,17 +376,14 @@ def _write_names(view: View, scene: DrawnScene) -> None:
 
 def _draw_arrows(view: View, scene: DrawnScene, noted: bool) -> None:
     """Draw forces of hands in the colours of their utilisation, and the load."""
-    steps: dict[tuple[float, ...], Array] = {}
-    tips, texts = [], []
+    load, steps, tips, texts = PICTURE_SETTINGS.load, {}, [], []
     for arrow in scene.arrows:
-        known = arrow.utilisation
-        used = None if known is None else UTILISATION_COLOURS(UTILISATION_NORM(known))
-        colour = used or PICTURE_SETTINGS.load
+        colour = load if arrow.utilisation is None else colour_of(arrow.utilisation)
         begin, tip = view.arrow(arrow.start, scene.scale * arrow.force, colour)
         if not noted:
             continue
         if arrow.kind == "load":
-            view.beyond(arrow.text, tip, tip - begin, color=PICTURE_SETTINGS.load)
+            view.beyond(arrow.text, tip, tip - begin, color=load)
             continue
         steps[tuple(tip)] = tip - begin
         tips.append(tip)

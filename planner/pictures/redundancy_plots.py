@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 
-from hand_models.base import write_picture
+from hand_models.base import panel_grid, write_picture
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS
 from planner.pictures.plan_views import ink_on
@@ -17,7 +17,6 @@ from planner.result import Loss, Redundancy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.cm import ScalarMappable
 
 __all__ = ["plot_redundancy"]
 
@@ -35,19 +34,14 @@ def plot_redundancy(redundancy: Redundancy, path: Path, title: str) -> None:
         Picture file; its suffix, PNG, PDF or SVG, is the format.
     title : str
     """
-    from matplotlib.cm import ScalarMappable
-
     limbs = list(dict.fromkeys(loss.limb for loss in redundancy.losses))
     whole = "no plan" if redundancy.utilisation is None else f"{redundancy.utilisation:.3f}"
     # the more the darker, as greys too; what is beyond the cap is bold
     colours = ScalarMappable(Normalize(0.5, 1.5), "YlOrBr")
-    height = -(-len(limbs) // 2)
-    figure = Figure(figsize=(8.0, 1.1 + 2.1 * height), layout="constrained")
-    grid = figure.subplots(height, min(len(limbs), 2), squeeze=False)
-    for axes, limb in zip(grid.ravel(), limbs, strict=False):
+    size = 8.0, 1.1 + 2.1 * -(-len(limbs) // 2)
+    figure, grid = panel_grid(len(limbs), min(len(limbs), 2), size)
+    for axes, limb in zip(grid, limbs, strict=True):
         _hand(axes, [loss for loss in redundancy.losses if loss.limb == limb], colours)
-    for axes in grid.ravel()[len(limbs) :]:
-        axes.set_axis_off()
     figure.suptitle(f"{title}: utilisation without a part ({whole} with all; bold: beyond the cap)")
     figure.colorbar(colours, ax=grid, label="utilisation [1]", extend="both", shrink=0.9)
     write_picture(figure, path)
@@ -64,13 +58,8 @@ def _hand(axes: Axes, losses: list[Loss], colours: ScalarMappable) -> None:
         used = np.inf if loss.utilisation is None else loss.utilisation
         colour = colours.to_rgba(np.array([used]))[0]
         axes.fill([x, x + 1, x + 1, x], [y, y, y + 1, y + 1], color=colour, ec="white", lw=2.0)
-        weight = "normal" if loss.holds else "bold"
-        style: dict[str, Any] = {
-            "ha": "center",
-            "va": "center",
-            "weight": weight,
-            "color": ink_on(colour),
-        }
+        style: dict[str, Any] = {"ha": "center", "va": "center", "color": ink_on(colour)}
+        style["weight"] = "normal" if loss.holds else "bold"
         axes.text(x + 0.5, y + 0.5, _number(loss), **style)
     axes.set(xlim=(0, len(GRID_COLUMNS)), ylim=(len(FINGERS), 0))
     names = [name.replace(" ", "\n") for name in GRID_COLUMNS]

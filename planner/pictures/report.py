@@ -9,16 +9,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.figure import Figure
 from msgspec import structs
 
-from hand_models.base import COLOUR_OF, Array, whole_file, write_picture
+from hand_models.base import COLOUR_OF, Array, panel_grid, whole_file, write_picture
 from planner.pictures.climb_plots import draw_climb, draw_support
 from planner.result import SPREAD_SETTINGS, LimitName, Plan
 from planner.route import Climb, OutOfReach, RouteResult, RouteStage
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["draw_route", "summary", "write_report"]
 
@@ -60,11 +62,8 @@ def write_report(
         "picture": folder / "margin.png",
         "summary": folder / "summary.json",
     }
-    with (
-        whole_file(files["table"]) as part,
-        part.open("w", newline="", encoding="utf-8") as stream,
-    ):
-        rows = [_row(*each) for each in zip(result.stages, result.plans, strict=True)]
+    rows = [_row(*each) for each in zip(result.stages, result.plans, strict=True)]
+    with whole_file(files["table"]) as part, part.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.DictWriter(stream, rows[0])
         writer.writeheader()
         writer.writerows(rows)
@@ -126,21 +125,20 @@ def _climb(climb: Climb, digest: str | None) -> dict[str, Any]:
     """Return the moves of a climb, the start among them, and why it ends early."""
     failure = None if climb.failure is None else asdict(climb.failure)
     rows, begun = [], 0.0
-    for _, group in groupby(climb.knots, key=lambda knot: knot.move):
+    for move, group in groupby(climb.knots, key=lambda knot: knot.move):
         knots = list(group)
         most = max(knots, key=lambda knot: knot.utilisation)
-        rows.append(
-            {
-                "move": most.move,
-                "limb": most.limb,
-                "time": knots[-1].time - begun,
-                "knots": len(knots),
-                "utilisation": most.utilisation,
-                "bound": max((k.bound for k in knots if k.bound is not None), default=None),
-                "limiting": most.limiting and structs.asdict(most.limiting),
-                "complete": failure is None or failure["move"] != most.move,
-            }
-        )
+        row = {
+            "move": move,
+            "limb": most.limb,
+            "time": knots[-1].time - begun,
+            "knots": len(knots),
+            "utilisation": most.utilisation,
+            "bound": max((k.bound for k in knots if k.bound is not None), default=None),
+            "limiting": most.limiting and structs.asdict(most.limiting),
+            "complete": failure is None or failure["move"] != move,
+        }
+        rows.append(row)
         begun = knots[-1].time
     return {
         "knots": len(climb.knots),
@@ -164,13 +162,8 @@ def _warnings(result: RouteResult) -> Iterator[str]:
 
 def _spoken(moves: Sequence[int]) -> str:
     """Name moves in order, and the start: ``start, moves 1 to 3, 5``."""
-    numbers = sorted({move for move in moves if move})
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
+    numbers = np.array(sorted({move for move in moves if move}), int)
+    runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1) if len(numbers) else []
     ranges = [f"{run[0]} to {run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs]
     named = ["move" + "s" * (len(numbers) > 1) + " " + ", ".join(ranges)] if ranges else []
     return ", ".join(["start"] * (0 in moves) + named)
@@ -248,9 +241,8 @@ def draw_route(result: RouteResult) -> Figure:
     index = np.arange(len(result.plans))
     stage_width = 0.32  # that a stage needs [inch]
     wide = float(np.clip(stage_width * len(index), *(11.0, 60.0)))
-    figure = Figure(figsize=(wide, 6.5), layout="constrained")
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    used = np.array([np.nan if p.utilisation is None else p.utilisation for p in result.plans])
+    figure, (upper, lower) = panel_grid(2, 1, (wide, 6.5), sharex=True)
+    used = np.array([plan.utilisation for plan in result.plans], float)
     bands = [_band(result.plans, name) for name in ("utilisation", "load_factor")]
     cap = result.route.limits.utilisation
     # what is far beyond the limit is cut off and written in, so that the rest can be seen
@@ -258,19 +250,13 @@ def draw_route(result: RouteResult) -> Figure:
     colours = [PHASE_COLOURS[stage.phase] for stage in result.stages]
     upper.bar(index, np.nan_to_num(np.minimum(used, height)), color=colours)
     # of what is written in a bar, from its upper end
-    in_bar: dict[str, Any] = {
-        "rotation": 90,
-        "ha": "center",
-        "va": "top",
-        "weight": "bold",
-        "fontsize": 9,
-    }
+    bold: dict[str, Any] = {"ha": "center", "weight": "bold"}
+    in_bar: dict[str, Any] = {"rotation": 90, "va": "top", "fontsize": 9, **bold}
     on_white: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
     for i in np.flatnonzero(used > height):
         upper.text(i, 0.97 * height, f"{used[i]:.3g}", color="white", **in_bar)
-        upper.plot(
-            [i - 0.5, i + 0.5], np.multiply((0.7, 0.73), height), color="white", linewidth=3.0
-        )
+        gap = np.multiply((0.7, 0.73), height)
+        upper.plot([i - 0.5, i + 0.5], gap, color="white", linewidth=3.0)
     for i in index[np.isnan(used)]:
         upper.bar(i, height, color="none", edgecolor=COLOUR_OF["red"], hatch="//")
         upper.text(i, 0.97 * height, result.plans[i].status, bbox=on_white, **in_bar)
@@ -280,25 +266,15 @@ def draw_route(result: RouteResult) -> Figure:
             upper.bar(0, 0, color=colour, label=phase)
     crux = result.crux
     over = float(np.nanmax([used[crux], bands[0][1, crux], 0.0]))
-    upper.annotate(
-        "crux",
-        (crux, height if np.isnan(used[crux]) else min(over, height)),
-        xytext=(0, 14),
-        textcoords="offset points",
-        ha="center",
-        weight="bold",
-        bbox=on_white,
-        arrowprops={"arrowstyle": "-|>"},
-    )
-    upper.set(
-        ylabel="utilisation [1]",
-        ylim=(0.0, height * 1.2),
-    )
+    place = crux, height if np.isnan(used[crux]) else min(over, height)
+    note: dict[str, Any] = {"textcoords": "offset points", "bbox": on_white, **bold}
+    upper.annotate("crux", place, xytext=(0, 14), arrowprops={"arrowstyle": "-|>"}, **note)
+    upper.set(ylabel="utilisation [1]", ylim=(0.0, height * 1.2))
     figure.suptitle(result.route.name, parse_math=False)
     for axes, band in zip((upper, lower), bands, strict=True):
         _draw_band(axes, band, _of_draws(result.plans))
     upper.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=7, fontsize=8, frameon=False)
-    factor = np.array([np.nan if p.load_factor is None else p.load_factor for p in result.plans])
+    factor = np.array([plan.load_factor for plan in result.plans], float)
     lower.plot(index, factor, "o-", color="0.2")
     lower.axhline(1.0, color=COLOUR_OF["red"])
     for i in np.flatnonzero(np.isnan(factor)):
@@ -308,11 +284,10 @@ def draw_route(result: RouteResult) -> Figure:
         lower.text(i, 0.05, text, rotation=90, ha="center", va="bottom", fontsize=8, color="0.4")
     lower.set(ylabel="load factor [1]", xlabel="stance")
     lower.set_ylim(0.0, 1.1 * float(np.nanmax([*factor, *bands[1][1], 1.0])))
+    limbs = [(stage.limb or "").replace("_", " ") for stage in result.stages]
     labels = [
-        "start"
-        if s.move == 0
-        else f"{s.move} {s.phase}\n{(s.limb or '').replace('_', ' ')}".strip()
-        for s in result.stages
+        f"{stage.move} {stage.phase}\n{limb}".strip() if stage.move else "start"
+        for stage, limb in zip(result.stages, limbs, strict=True)
     ]
     shown = slice(None, None, math.ceil(stage_width * len(index) / wide))
     lower.set_xticks(index[shown], labels[shown], rotation=90, fontsize=8)

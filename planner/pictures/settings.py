@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from hand_models.base import COLOUR_OF
 
-__all__ = ["PICTURE_SETTINGS", "PictureSettings"]
+__all__ = ["CENTRED_TEXT", "NOTE_STYLE", "PICTURE_SETTINGS", "PictureSettings"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,3 +50,16 @@ class PictureSettings:
 
 
 PICTURE_SETTINGS: Final = PictureSettings()
+
+CENTRED_TEXT: Final[dict[str, Any]] = {"ha": "center", "va": "center", "fontsize": 8}
+"""Style of a text in the middle of a place."""
+
+NOTE_STYLE: Final[dict[str, Any]] = CENTRED_TEXT | {
+    "bbox": {
+        "facecolor": "white",
+        "edgecolor": "none",
+        "alpha": 0.7,
+        "pad": PICTURE_SETTINGS.note_padding,
+    },
+}
+"""Style of a note beside what it names, on a light ground."""

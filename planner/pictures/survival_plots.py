@@ -6,14 +6,14 @@ survival stage by stage.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.base import COLOUR_OF, write_picture
+from hand_models.base import COLOUR_OF, Array, write_picture
 from planner.result import Survival, SurvivalShare
 from planner.route import RouteSurvival
 
@@ -56,13 +56,14 @@ def plot_survival(
     for axes in (timeline, curves, agreement):
         axes.title.set_fontsize(9)
         axes.xaxis.label.set_fontsize(9)
-    figure.suptitle(
-        f"{title}: when tiles slip\nWeibull modulus {found.moduli}\nstrengths "
-        f"{found.strength:g} times those assumed; scatter of holds {found.hold_scatter:g}, of the "
-        f"rock {found.rock_scatter:g}",
-        fontsize=11,
-        parse_math=False,
+    strengths = f"strengths {found.strength:g} times those assumed"
+    scatter = f"scatter of holds {found.hold_scatter:g}, of the rock {found.rock_scatter:g}"
+    lines = (
+        f"{title}: when tiles slip",
+        f"Weibull modulus {found.moduli}",
+        f"{strengths}; {scatter}",
     )
+    figure.suptitle("\n".join(lines), fontsize=11, parse_math=False)
     write_picture(figure, path, 120)
 
 
@@ -71,21 +72,19 @@ def _draw_cascade(axes: Axes, found: Survival) -> None:
 
     Of a long cascade the first slips and the last ones, with a row between them.
     """
-    drawn, more = list(enumerate(found.cascade)), len(found.cascade) + 1 - MOST_SLIPS
+    drawn, more = dict(enumerate(found.cascade)), len(found.cascade) + 1 - MOST_SLIPS
     if more > 1:
         first = MOST_SLIPS // 2
-        last = [(i - more + 1, slip) for i, slip in drawn[first + more :]]
-        drawn = [*drawn[:first], *last]
-    names = {i: " ".join(p for p in (s.limb, s.finger, s.phalanx) if p) for i, s in drawn}
-    places = np.array(list(names))
-    loads = [s.load for _, s in drawn]
+        last = enumerate(found.cascade[first + more :], start=first + 1)
+        drawn = dict(enumerate(found.cascade[:first])) | dict(last)
+    names = {i: " ".join(filter(None, (s.limb, s.finger, s.phalanx))) for i, s in drawn.items()}
     style: dict[str, Any] = {"height": 0.55, "color": COLOUR_OF["red"], "alpha": 0.75}
-    axes.barh(places, loads, label="the weakest, which slips", **style)
-    left = [(i, s.most) for i, s in drawn if s.most is not None]
-    if left:
-        at, most = zip(*left, strict=True)
-        axes.plot(most, np.array(at) + 0.4, "D", color="black", markersize=5,
-                  label="the weakest of those left, afterwards")  # fmt: skip
+    loads = [slip.load for slip in drawn.values()]
+    axes.barh(np.array(list(drawn)), loads, label="the weakest, which slips", **style)
+    left = np.array([(s.most, i + 0.4) for i, s in drawn.items() if s.most is not None])
+    if len(left):
+        label = "the weakest of those left, afterwards"
+        axes.plot(*left.T, "D", color="black", markersize=5, label=label)
     axes.axvline(1.0, color="0.4", linewidth=1.0, linestyle="--")
     if more > 1:
         names[MOST_SLIPS // 2] = f"… {more} more …"
@@ -112,14 +111,11 @@ def _draw_curves(axes: Axes, over_load: Sequence[tuple[float, Survival]]) -> Non
     formula = [s.no_slip for _, s in over_load]
     axes.plot(loads, formula, color="black", label="no tile or palm slips")
     for name, colour, label in DRAWN_SHARES:
-        known = [(load, getattr(s, name)) for load, s in over_load]
-        shares = [(load, share) for load, share in known if isinstance(share, SurvivalShare)]
+        shares = _shares(over_load, name)
         if shares:
-            at = [load for load, _ in shares]
-            axes.plot(at, [s.probability for _, s in shares], "o-", color=colour,
-                      label=f"{label}; {_draws(shares)}")  # fmt: skip
-            axes.fill_between(at, [s.low for _, s in shares], [s.high for _, s in shares],
-                              color=colour, alpha=0.2, linewidth=0.0)  # fmt: skip
+            at, (middle, low, high) = list(shares), _ends(shares.values())
+            axes.plot(at, middle, "o-", color=colour, label=f"{label}; {_draws(shares)}")
+            axes.fill_between(at, low, high, color=colour, alpha=0.2, linewidth=0.0)
     axes.axvline(1.0, color="0.6", linewidth=0.8)
     axes.set(title="survival, with its interval of 95 %", xlabel="load over the one asked for",
              ylabel="probability", ylim=(-0.02, 1.02))  # fmt: skip
@@ -127,10 +123,26 @@ def _draw_curves(axes: Axes, over_load: Sequence[tuple[float, Survival]]) -> Non
     _legend_below(axes)
 
 
-def _draws(shares: Sequence[tuple[float, SurvivalShare]]) -> str:
+def _shares(found: Iterable[tuple[float, Any]], name: str) -> dict[float, SurvivalShare]:
+    """Return the shares of a name that are known, by load or by stage."""
+    known = ((place, getattr(each, name)) for place, each in found)
+    return {place: share for place, share in known if isinstance(share, SurvivalShare)}
+
+
+def _ends(shares: Iterable[SurvivalShare]) -> Array:
+    """Return the probabilities of shares, and the low and high ends of their intervals."""
+    return np.array([(s.probability, s.low, s.high) for s in shares]).reshape(-1, 3).T
+
+
+def _wide(ends: Array) -> Array:
+    """Return how far intervals go down and up from their probabilities."""
+    return np.maximum([ends[0] - ends[1], ends[2] - ends[0]], 0.0)
+
+
+def _draws(shares: Mapping[float, SurvivalShare]) -> str:
     """Return how many draws the shares have, at the load asked for and at the others."""
-    here = {share.draws for load, share in shares if load == 1.0}
-    others = {share.draws for load, share in shares if load != 1.0}
+    here = {share.draws for load, share in shares.items() if load == 1.0}
+    others = {share.draws for load, share in shares.items() if load != 1.0}
     said = "draws" if here == others else f"draws at load 1, {_span(others)} at others"
     return f"{_span(here)} {said}"
 
@@ -143,10 +155,9 @@ def _draw_agreement(axes: Axes, over_load: Sequence[tuple[float, Survival]]) -> 
     """Draw the simulated share without a slip over the formula's."""
     known = [(s.no_slip, s.slipped) for _, s in over_load if s.slipped is not None]
     formula = [no_slip for no_slip, _ in known]
-    none = np.array([1.0 - s.probability for _, s in known])
-    wide = [none - [1.0 - s.high for _, s in known], [1.0 - s.low for _, s in known] - none]
+    none = 1.0 - _ends(slipped for _, slipped in known)[[0, 2, 1]]
     axes.plot([0.0, 1.0], [0.0, 1.0], color="0.6", linewidth=0.8)
-    axes.errorbar(formula, none, yerr=np.maximum(wide, 0.0), fmt="o", markersize=4, capsize=2.5)
+    axes.errorbar(formula, none[0], yerr=_wide(none), fmt="o", markersize=4, capsize=2.5)
     axes.set(title="no tile or palm slips", xlabel="by the formula", ylabel="simulated")
     axes.set_aspect("equal")
     axes.grid(alpha=0.3)
@@ -168,16 +179,14 @@ def plot_route_survival(found: RouteSurvival, path: Path) -> None:
     axes.plot([i for i, _ in known], [s.no_slip for _, s in known], "o", color="black",
               markersize=4, label=_of_climb("no tile or palm slips", found.no_slip))  # fmt: skip
     for shift, (name, colour, label) in zip((-0.12, 0.12), DRAWN_SHARES, strict=True):
-        pairs = [(i, getattr(s, name)) for i, s in known]
-        shares = [(i, share) for i, share in pairs if isinstance(share, SurvivalShare)]
+        shares = _shares(known, name)
         if not shares:
             continue
         whole = getattr(found, name)
         label = _of_climb(label, None if whole is None else whole.all_stages.probability)
-        middle = np.array([share.probability for _, share in shares])
-        wide = [middle - [s.low for _, s in shares], [s.high for _, s in shares] - middle]
-        axes.errorbar([i + shift for i, _ in shares], middle, yerr=np.maximum(wide, 0.0), fmt="s",
-                      markersize=5, capsize=2.5, color=colour, label=label)  # fmt: skip
+        ends, at = _ends(shares.values()), [place + shift for place in shares]
+        style: dict[str, Any] = {"color": colour, "markersize": 5, "capsize": 2.5}
+        axes.errorbar(at, ends[0], yerr=_wide(ends), fmt="s", label=label, **style)
     for stage in found.stages:
         if stage.survival is None:
             axes.axvspan(stage.index - 0.5, stage.index + 0.5, color="0.85", linewidth=0.0)
