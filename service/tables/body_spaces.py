@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, Final
 
 import numpy as np
 from rich.console import Console
 from rich.text import Text
 
+from hand_models.base import Array
 from planner import OTHER_COMPONENTS, WRENCH_COMPONENTS
 from service import replies
 from service.replies import BodySpaceReply
 from service.tables.command_line import print_oddities
-from service.tables.layout import (
-    PrintedColumn,
-    axis_unit,
-    in_colour,
-    name,
-    number,
-    print_rows,
-    text,
-)
+from service.tables.layout import axis_unit, in_colour, joined, name, number, print_rows, text
 
 __all__ = ["print_body_space", "print_com_region"]
+
+
+def _limit_words(limit: Any) -> str:
+    return joined(limit.limb, limit.joint, limit.finger, limit.phalanx, limit.limit)
+
+
+LIMIT_COLUMN: Final = text("first to let go", "1.limiting", _limit_words)
+"""Column of what lets go first, of rows whose second cell has a limit."""
 
 
 def print_body_space(reply: BodySpaceReply, out: Console, accelerations: int = 0) -> None:
@@ -59,19 +61,9 @@ def print_body_space(reply: BodySpaceReply, out: Console, accelerations: int = 0
         "more: beyond the body wrench asked for, and what lets go there first",
         "pure: with every other component zero; extent: with whatever else; -: none",
     )
-    print_rows(reply.capability.items(), (axis, *ends, _lets_go()), out, title, legend=legend)
+    print_rows(reply.capability.items(), (axis, *ends, LIMIT_COLUMN), out, title, legend=legend)
     _print_section(reply.section, out)
     _print_accelerations(reply, out)
-
-
-def _lets_go() -> PrintedColumn:
-    """Return the column of what lets go first."""
-    return text("first to let go", "1.limiting", _limit_words)
-
-
-def _limit_words(limit: Any) -> str:
-    parts = (limit.limb, limit.joint, limit.finger, limit.phalanx, limit.limit)
-    return " ".join(part for part in parts if part is not None)
 
 
 def print_com_region(region: replies.ComRegionReply, out: Console, accelerations: int = 0) -> None:
@@ -108,19 +100,16 @@ def print_com_region(region: replies.ComRegionReply, out: Console, accelerations
         text("first to let go", "3", _limit_words),
     )
     print_rows(rows, columns, out, "how far the centre of mass may be along axes of W")
-    shape = {1: "a point", 2: "a segment"}.get(len(corners), f"{len(corners)} corners")
-    out.print(f"{shape}, at any height; known to {1e3 * max(region.gap, 1e-5):.2g} mm")
+    out.print(
+        f"{_shape_words(corners)}, at any height; known to {1e3 * max(region.gap, 1e-5):.2g} mm"
+    )
     if region.solid is not None:
         spans = np.array(region.solid.inner)
-        size = ", ".join(
-            f"{axis} {low:z.3f} to {high:z.3f} m"
-            for axis, low, high in zip("xyz", spans.min(axis=0), spans.max(axis=0), strict=True)
-        )
         out.print(
             f"under {len(region.solid.accelerations)} accelerations, a solid: "
             f"{len(spans)} corners, known to {1e3 * region.solid.gap:.2g} mm"
         )
-        out.print(size)
+        out.print(_ranges(spans, "xyz", ["m"] * 3, 3))
     if not region.exact:
         out.print("wrists that move: linearised where the plan puts them")
 
@@ -146,6 +135,19 @@ def _axis_name(axis: replies.Vector) -> str:
     return f"({', '.join(f'{value:z.3g}' for value in axis)})"
 
 
+def _shape_words(corners: Array) -> str:
+    """Return the shape of a polygon in words, from its corners."""
+    return {1: "a point", 2: "a segment"}.get(len(corners), f"{len(corners)} corners")
+
+
+def _ranges(points: Array, axes: Iterable[str], units: Iterable[str], digits: int) -> str:
+    """Return in words the range of points along each axis."""
+    ends = zip(axes, points.min(axis=0), points.max(axis=0), units, strict=True)
+    return ", ".join(
+        f"{axis} {low:z.{digits}f} to {high:z.{digits}f} {unit}" for axis, low, high, unit in ends
+    )
+
+
 def _print_section(section: replies.BodySectionReply, out: Console) -> None:
     """Print the size of a plane's part that is held."""
     plane = f"plane of {' and '.join(section.axes)}, {OTHER_COMPONENTS[section.others]}"
@@ -153,14 +155,9 @@ def _print_section(section: replies.BodySectionReply, out: Console) -> None:
         out.print(f"{plane}: nothing is held")
         return
     corners = np.array(section.inner)
-    ranges = ", ".join(
-        f"{axis} {low:z.1f} to {high:z.1f} {axis_unit(axis)}"
-        for axis, low, high in zip(
-            section.axes, corners.min(axis=0), corners.max(axis=0), strict=True
-        )
-    )
+    ranges = _ranges(corners, section.axes, map(axis_unit, section.axes), 1)
     over = " (moments over 0.1 m)" if any(axis.startswith("m") for axis in section.axes) else ""
-    shape = {1: "a point", 2: "a segment"}.get(len(corners), f"{len(corners)} corners")
+    shape = _shape_words(corners)
     out.print(f"{plane}: {shape}, {ranges}; known to {max(section.gap, 1e-3):.2g} N{over}")
 
 
@@ -175,4 +172,4 @@ def _print_accelerations(reply: BodySpaceReply, out: Console) -> None:
         rows.append((f"({where}) m/s²", one))
     largest = number("largest", "1.acceleration", "z.2f")
     title = "largest accelerations of the body from rest, in W"
-    print_rows(rows, (name("along", "0"), largest, _lets_go()), out, title)
+    print_rows(rows, (name("along", "0"), largest, LIMIT_COLUMN), out, title)

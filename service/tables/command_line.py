@@ -29,7 +29,7 @@ class ExitStatus(IntEnum):
     OVERLOADED = 3
 
     @classmethod
-    def of(cls, status: str) -> ExitStatus:
+    def of(cls, status: str, *, fails: bool = False) -> ExitStatus:
         """Return the exit status for the status of a plan, a route or a climb.
 
         Parameters
@@ -38,10 +38,12 @@ class ExitStatus(IntEnum):
             ``optimal`` gives DONE, as does a climb (``found``, ``not_proven``); ``overloaded``,
             ``infeasible``, ``unreachable``, and climbs that are not (``none``, ``blocked``) give
             OVERLOADED; any other status gives FAILED.
+        fails : bool, optional
+            True for OVERLOADED in place of DONE.
         """
         match status:
             case "optimal" | "found" | "not_proven":
-                return cls.DONE
+                return cls.OVERLOADED if fails else cls.DONE
             case "overloaded" | "infeasible" | "unreachable" | "none" | "blocked":
                 return cls.OVERLOADED
             case _:

@@ -9,21 +9,9 @@ from types import MappingProxyType
 
 from rich.console import Console
 
-from planner import (
-    Advice,
-    OpenLoop,
-    PalmLoadFactors,
-    Plan,
-    Quantiles,
-    RobustLoadFactor,
-    RouteSurvival,
-    Spread,
-    StageSurvival,
-    Survival,
-    SurvivalShare,
-)
+import planner
 from service.replies import PlanReply
-from service.tables.layout import counted, in_order, print_rows
+from service.tables.layout import counted, in_order, joined, name, number, print_rows
 
 __all__ = [
     "load_factor_words",
@@ -41,7 +29,7 @@ __all__ = [
 ]
 
 
-def words_of(advice: Advice, *, holding: bool = False) -> str:
+def words_of(advice: planner.Advice, *, holding: bool = False) -> str:
     """Return an advice as a sentence, with the utilisation that the change would give.
 
     Parameters
@@ -75,7 +63,7 @@ def print_advice(reply: PlanReply, out: Console) -> None:
         out.print("no change that was tried lowers the utilisation")
 
 
-def with_interval(value: float, spread: Quantiles | None) -> str:
+def with_interval(value: float, spread: planner.Quantiles | None) -> str:
     """Return a number as text, with its interval from the 5 % to the 95 % quantile.
 
     The interval is rounded to the first decimal in which its ends differ, and the number to one
@@ -94,7 +82,7 @@ def with_interval(value: float, spread: Quantiles | None) -> str:
     return f"{value:.{more}f} ({_interval(spread)})"
 
 
-def print_spread(spread: Spread, out: Console) -> None:
+def print_spread(spread: planner.Spread, out: Console) -> None:
     """Print what a Monte Carlo study of uncertain parameters found, and how set-points fare in it.
 
     Parameters
@@ -125,12 +113,12 @@ def print_spread(spread: Spread, out: Console) -> None:
         print_rows(rows, in_order([counted(spread.draws, "sample")], heads), out, result=True)
 
 
-def spread_sentences(spread: Spread) -> list[str]:
+def spread_sentences(spread: planner.Spread) -> list[str]:
     """Return where a stance is feasible, and what the load factor's variance goes with."""
     return [each for each in (_spread_sentence(spread), _variance_sentence(spread)) if each]
 
 
-def _spread_sentence(spread: Spread) -> str:
+def _spread_sentence(spread: planner.Spread) -> str:
     """Return in a sentence on which rock a stance is feasible, else in how many samples."""
     limit, samples = spread.threshold, counted(spread.draws, "sample")
     said = f"feasible in {spread.holds} of {samples}"
@@ -157,7 +145,7 @@ def _spread_sentence(spread: Spread) -> str:
     return said + _refused(spread.refused)
 
 
-def _variance_sentence(spread: Spread) -> str:
+def _variance_sentence(spread: planner.Spread) -> str:
     """Return in a sentence what the load factor's variance goes with: rock, then other numbers."""
     parts = []
     if spread.rock_share:
@@ -173,7 +161,7 @@ def _variance_sentence(spread: Spread) -> str:
     return f"variance of the load factor: {'; '.join(parts)}" if parts else ""
 
 
-def robust_sentence(robust: RobustLoadFactor) -> str:
+def robust_sentence(robust: planner.RobustLoadFactor) -> str:
     """Return a sentence about the load factor over sampled places of the hands.
 
     Parameters
@@ -204,19 +192,21 @@ def robust_sentence(robust: RobustLoadFactor) -> str:
 
 
 def sure_sentences(
-    reply: PlanReply | Plan,
-    without_palm: Plan | None = None,
-    palm_parts: PalmLoadFactors | None = None,
+    reply: PlanReply | planner.Plan,
+    without_palm: planner.Plan | None = None,
+    palm_parts: planner.PalmLoadFactors | None = None,
 ) -> list[str]:
     """Return what says how sure a plan is: spread, load factors without palms, displaced hands."""
-    said = spread_sentences(reply.spread) if isinstance(reply.spread, Spread) else []
+    said = spread_sentences(reply.spread) if isinstance(reply.spread, planner.Spread) else []
     said += palm_sentences(without_palm, palm_parts)
-    if isinstance(reply.robust, RobustLoadFactor):
+    if isinstance(reply.robust, planner.RobustLoadFactor):
         said.append(robust_sentence(reply.robust))
     return said
 
 
-def palm_sentences(without_palm: Plan | None, palm_parts: PalmLoadFactors | None) -> list[str]:
+def palm_sentences(
+    without_palm: planner.Plan | None, palm_parts: planner.PalmLoadFactors | None
+) -> list[str]:
     """Return the load factors of plans without the palms, and without a part of their load."""
     if without_palm is None:
         return []
@@ -227,7 +217,7 @@ def palm_sentences(without_palm: Plan | None, palm_parts: PalmLoadFactors | None
     return said
 
 
-def load_factor_words(reply: PlanReply | Plan) -> str:
+def load_factor_words(reply: PlanReply | planner.Plan) -> str:
     """Return the load factor of a plan, or why there is none."""
     if reply.load_factor_unbounded:
         return "unbounded"
@@ -236,7 +226,7 @@ def load_factor_words(reply: PlanReply | Plan) -> str:
     return f"{reply.load_factor:.3f}"
 
 
-def print_open_loop(found: OpenLoop, out: Console) -> None:
+def print_open_loop(found: planner.OpenLoop, out: Console) -> None:
     """Print how a plan fares that is executed as it is on displaced hands.
 
     Parameters
@@ -268,7 +258,7 @@ def print_open_loop(found: OpenLoop, out: Console) -> None:
     print_rows([row], in_order(heads, texts=["worst hand"]), out, result=True)
 
 
-def print_survival(found: Survival, out: Console) -> None:
+def print_survival(found: planner.Survival, out: Console) -> None:
     """Print how likely it is that no tile slips, and that all hands hold if some do.
 
     Parameters
@@ -290,15 +280,20 @@ def print_survival(found: Survival, out: Console) -> None:
         ("all hold, tensions fixed", found.holds),
         (f"all hold, new set-points {_when(found.delay)} after each slip", found.replanned),
     )
-    rows = [(what, *_share(share)) for what, share in simulated if share is not None]
-    print_rows(rows, in_order(["simulated"], ("share", "low", "high", "draws")), out, result=True)
+    columns = (
+        name("simulated", "0"),
+        number("share", "1.probability", ".3f"),
+        *(number(end, f"1.{end}", ".3f") for end in ("low", "high")),
+        number("draws", "1.draws"),
+    )
+    print_rows([row for row in simulated if row[1] is not None], columns, out, result=True)
     if found.first:
         likely = ", ".join(f"{tile} {share:.3f}" for tile, share in list(found.first.items())[:4])
         out.print(f"slips first, with a probability of: {likely}")
 
 
 def _print_no_slip(
-    what: str, found: Survival | RouteSurvival, strength: float, out: Console
+    what: str, found: planner.Survival | planner.RouteSurvival, strength: float, out: Console
 ) -> None:
     """Print the probability of the formula, and the strengths for which it is 0.9 and 0.99."""
     rows = [
@@ -313,7 +308,7 @@ def _when(delay: float) -> str:
     return f"{delay:g} s" if delay else "at once"
 
 
-def print_route_survival(found: RouteSurvival, out: Console) -> None:
+def print_route_survival(found: planner.RouteSurvival, out: Console) -> None:
     """Print the survival of a climb: one row a stage, all stages together, and the worst.
 
     Parameters
@@ -322,14 +317,21 @@ def print_route_survival(found: RouteSurvival, out: Console) -> None:
     out : Console
         Console to print on.
     """
+    worst, fixed, anew = found.stages[found.worst], "survival.holds", "survival.replanned"
+    columns = (
+        *map(name, ("move", "phase", "limb")),
+        number("util", _used),
+        number("no slip", "survival.no_slip", ".3f"),
+        number("fixed", f"{fixed}.probability", ".3f"),
+        number("95 %", fixed, _ends),
+        number("new points", f"{anew}.probability", ".3f"),
+        number("95 %", anew, _ends),
+    )
     print_rows(
-        [_stage_row(stage) for stage in found.stages],
-        in_order(
-            ["move", "phase", "limb"],
-            ("util", "no slip", "fixed", "95 %", "new points", "95 %"),
-        ),
+        found.stages,
+        columns,
         out,
-        style=lambda row: "bold" if row[:3] == _place(found.stages[found.worst]) else "",
+        style=lambda stage: "bold" if stage is worst else "",
         legend=["all hands hold, with fixed tensions, and with new set-points after each slip"],
     )
     if found.reason is not None:
@@ -345,34 +347,18 @@ def print_route_survival(found: RouteSurvival, out: Console) -> None:
                 f"{whole.least:.3f}, the least of the stages; {whole.product:.3f} if "
                 "each stage drew anew"
             )
-    out.print(f"worst: {' '.join(str(part) for part in _place(found.stages[found.worst]) if part)}")
+    out.print(f"worst: {joined(str(worst.move or ''), worst.phase, worst.limb)}")
 
 
-def _place(stage: StageSurvival) -> tuple[int, str, str | None]:
-    return stage.move, stage.phase, stage.limb
+def _used(stage: planner.StageSurvival) -> str:
+    """Return a stage's utilisation, with a star beyond the cap; its status where it has no plan."""
+    if stage.survival is None or stage.utilisation is None:
+        return stage.status
+    return f"{stage.utilisation:.2f}" + ("" if stage.status == "optimal" else "*")
 
 
-def _stage_row(stage: StageSurvival) -> tuple[object, ...]:
-    """Return a stage's cells; a utilisation beyond the cap has a star."""
-    there = stage.survival
-    if there is None or stage.utilisation is None:
-        return (*_place(stage), stage.status, *[None] * 5)
-    star = "" if stage.status == "optimal" else "*"
-    shares = [
-        (None, None) if share is None else (f"{share.probability:.3f}", _ends(share, 2))
-        for share in (there.holds, there.replanned)
-    ]
-    used = f"{stage.utilisation:.2f}{star}"
-    return (*_place(stage), used, f"{there.no_slip:.3f}", *shares[0], *shares[1])
-
-
-def _ends(share: SurvivalShare, digits: int) -> str:
+def _ends(share: planner.SurvivalShare, digits: int = 2) -> str:
     return f"{share.low:.{digits}f}–{share.high:.{digits}f}"
-
-
-def _share(share: SurvivalShare) -> tuple[str, ...]:
-    each = (share.probability, share.low, share.high)
-    return (*(f"{value:.3f}" for value in each), f"{share.draws}")
 
 
 def _refused(limbs: Mapping[str, int], reasons: Mapping[str, str] = MappingProxyType({})) -> str:
@@ -381,14 +367,14 @@ def _refused(limbs: Mapping[str, int], reasons: Mapping[str, str] = MappingProxy
     return f"; hands that cannot be there: {each}" if each else ""
 
 
-def _digits(spread: Quantiles) -> int:
+def _digits(spread: planner.Quantiles) -> int:
     """Return the first decimal in which an interval's ends differ, from 1 to 3."""
     wide = spread.high - spread.low
     first = 3 if wide <= 0.0 else math.ceil(-math.log10(wide))
     return min(max(first, 1), 3)
 
 
-def _interval(spread: Quantiles, digits: int | None = None) -> str:
+def _interval(spread: planner.Quantiles, digits: int | None = None) -> str:
     """Return an interval as text, or one number where its ends do not differ."""
     digits = _digits(spread) if digits is None else digits
     low, high = f"{spread.low:.{digits}f}", f"{spread.high:.{digits}f}"

@@ -21,6 +21,7 @@ __all__ = [
     "counted",
     "in_colour",
     "in_order",
+    "joined",
     "name",
     "number",
     "print_rows",
@@ -97,6 +98,11 @@ def counted(count: int, one: str, many: str | None = None) -> str:
     """
     things = one if count == 1 else many or f"{one}s"
     return f"{count:,} {things}" if count else f"no {things}"
+
+
+def joined(*parts: str | None) -> str:
+    """Return the parts that are there with spaces between them."""
+    return " ".join(filter(None, parts))
 
 
 def short(value: float, digits: int) -> str:

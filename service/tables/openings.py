@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from service.replies import WRENCH_AXES, OpeningReply
-from service.tables.layout import in_order, name, number, print_rows
+from service.tables.layout import axis_unit, in_order, name, number, print_rows
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -22,8 +22,7 @@ def print_opening(opening: OpeningReply, out: Console) -> None:
     out : Console
         Console to print on.
     """
-    units = ["N"] * 3 + ["N·m"] * 3
-    heads = [f"{axis} {unit}" for axis, unit in zip(WRENCH_AXES, units, strict=True)]
+    heads = [f"{axis} {axis_unit(axis)}" for axis in WRENCH_AXES]
     rows = [(f"{knot.tensions[0]:.2f}", *knot.wrench) for knot in opening.knots]
     title = "wrench on the rock, in H, as all tendons are lowered"
     print_rows(rows, in_order(["tension N"], heads, form="z.2f"), out, title)

@@ -29,6 +29,7 @@ from service.tables.extras import (
 from service.tables.layout import (
     in_colour,
     in_order,
+    joined,
     name,
     number,
     print_rows,
@@ -355,10 +356,6 @@ def print_route(
 
 def _print_moves(climb: Mapping[str, Any], out: Console) -> None:
     """Print the moves of a climb's summary, and why it fails."""
-
-    def limit(row: Mapping[str, Any]) -> str | None:
-        return " ".join(filter(None, (row["limiting"] or {}).values())) or None
-
     columns = (
         name("move", lambda row: str(row["move"] or "start")),
         name("limb"),
@@ -366,7 +363,7 @@ def _print_moves(climb: Mapping[str, Any], out: Console) -> None:
         number("knots"),
         number("util", "utilisation", ".2f"),
         number("bound", "bound", ".2f"),
-        text("limited by", limit),
+        text("limited by", lambda row: joined(*(row["limiting"] or {}).values()) or None),
     )
     title = f"moves: {climb['knots']} knots, {climb['time']:.1f} s long"
     print_rows(climb["moves"], columns, out, title)

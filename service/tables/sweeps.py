@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 
 from service.sweeping import Held, Sweep, SweepRow, held, word_of
-from service.tables.layout import in_order, name, number, print_rows, text
+from service.tables.layout import in_order, joined, name, number, print_rows, text
 
 __all__ = ["print_sweep"]
 
@@ -91,10 +91,12 @@ def _factor(row: SweepRow) -> str | None:
 
 def _limit(row: SweepRow) -> str | None:
     """Return the limit of a plan, or the error of a point."""
-    if row.error is not None or row.limiting is None:
-        return None if row.error is None else row.error.kind
+    if row.error is not None:
+        return row.error.kind
     limit = row.limiting
-    return " ".join(part for part in (limit.limb, limit.phalanx, limit.joint, limit.limit) if part)
+    if limit is None:
+        return None
+    return joined(limit.limb, limit.phalanx, limit.joint, limit.limit)
 
 
 def _print_held(sweep: Sweep, x: int, y: int, out: Console) -> None:
