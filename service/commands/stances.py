@@ -39,6 +39,7 @@ __all__ = [
 ]
 
 RequestT = TypeVar("RequestT", bound=requests.Request)
+StanceOrRoute = requests.PlanRequest | requests.RouteRequest
 
 
 class Given(NamedTuple, Generic[RequestT]):
@@ -102,7 +103,7 @@ def read_with_text(source: str) -> tuple[requests.PlanRequest, Given[requests.Pl
     given : Given
         The request as the user wrote it.
     """
-    return _read(source, requests.PlanRequest, "STANCE", "stance")
+    return _read(source, "STANCE", "stance", requests.PlanRequest)
 
 
 def read_route(source: str) -> requests.RouteRequest:
@@ -130,10 +131,10 @@ def read_route_with_text(
     source: str,
 ) -> tuple[requests.RouteRequest, Given[requests.RouteRequest]]:
     """Read a route request as `read_route` does, and return it as the user wrote it as well."""
-    return _read(source, requests.RouteRequest, "ROUTE", "route")
+    return _read(source, "ROUTE", "route", requests.RouteRequest)
 
 
-def read_stance_or_route(source: str) -> requests.PlanRequest | requests.RouteRequest:
+def read_stance_or_route(source: str) -> StanceOrRoute:
     """Read what a command was given as STANCE or ROUTE; with ``moves`` it is a route.
 
     Parameters
@@ -152,27 +153,14 @@ def read_stance_or_route(source: str) -> requests.PlanRequest | requests.RouteRe
     InvalidInputError
         If the source does not exist or cannot be read, or is not a valid request.
     """
-    given = _given(source, "STANCE")
-    if given is not None:
-        text, path = given
-        if _has_moves(text, path.name):
-            return _decoded(text, requests.RouteRequest, path)[0]
-        return _decoded(text, requests.PlanRequest, path)[0]
-    if source in bundled(requests.RouteRequest):
-        return read_route(source)
-    if source in bundled():
-        return read_request(source)
-    names = ", ".join(bundled() + bundled(requests.RouteRequest))
-    raise InvalidInputError(
-        f"no such file, and no bundled stance or route {source!r}; bundled are {names}",
-        field="STANCE",
-    )
+    kinds: tuple[type[StanceOrRoute], ...] = (requests.PlanRequest, requests.RouteRequest)
+    return _read(source, "STANCE", "stance or route", *kinds)[0]
 
 
 def _has_moves(text: bytes, name: str) -> bool:
     """Return True if a request has moves; what cannot be read has none."""
     try:
-        content = _from_toml(text) if _is_toml(text, name) else msgspec.json.decode(text)
+        content = _content(text, name)
     except (wire.MalformedError, msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         return False
     return isinstance(content, dict) and "moves" in content
@@ -283,8 +271,7 @@ def limbs_of(source: str | None) -> tuple[str, ...]:
         else Path(source or "")
     )
     try:
-        text = _text(path)
-        asked = _from_toml(text) if _is_toml(text, path.name) else msgspec.json.decode(text)
+        asked = _content(_text(path), path.name)
         return tuple(str(hand["limb"]) for hand in asked["stance"]["hands"])
     except (OSError, wire.MalformedError, msgspec.DecodeError, LookupError, TypeError):
         return ("front_right", "rear_right", "rear_left", "front_left")
@@ -298,6 +285,11 @@ def _text(path: Traversable) -> bytes:
 def _is_toml(text: bytes, name: str) -> bool:
     """Return True if a request is written in TOML; no JSON begins with a comment."""
     return name.lower().endswith(".toml") or text.lstrip()[:1] == b"#"
+
+
+def _content(text: bytes, name: str) -> Any:
+    """Return the content of a request in JSON or TOML."""
+    return _from_toml(text) if _is_toml(text, name) else msgspec.json.decode(text)
 
 
 def _from_toml(text: bytes) -> dict[str, Any]:
@@ -320,34 +312,31 @@ def _folder(kind: type[requests.Request]) -> Traversable:
 
 
 def _read(
-    source: str, kind: type[RequestT], field: str, noun: str
+    source: str, field: str, noun: str, *kinds: type[RequestT]
 ) -> tuple[RequestT, Given[RequestT]]:
-    found = _given(source, field)
-    if found is not None:
-        text, path = found
-        return _decoded(text, kind, path)
-    if source in bundled(kind):
-        with resources.as_file(_folder(kind)) as folder:
-            path = folder / f"{source}.json"
-            whole, given = _decoded(path.read_bytes(), kind, path)
-            return whole, given._replace(files=None)
+    """Read a request of one of the kinds; of two, it is of the last if it has moves."""
+    path = Path(source)
+    if source == "-" or path.is_file() or path.is_fifo():
+        text = sys.stdin.buffer.read() if source == "-" else _read_file(path, field)
+        moves = len(kinds) > 1 and _has_moves(text, path.name)
+        return _decoded(text, kinds[-1 if moves else 0], path)
+    for kind in kinds:
+        if source in bundled(kind):
+            with resources.as_file(_folder(kind)) as folder:
+                path = folder / f"{source}.json"
+                whole, given = _decoded(path.read_bytes(), kind, path)
+                return whole, given._replace(files=None)
+    names = ", ".join(name for kind in kinds for name in bundled(kind))
     raise InvalidInputError(
-        f"no such file, and no bundled {noun} {source!r}; bundled are {', '.join(bundled(kind))}",
-        field=field,
+        f"no such file, and no bundled {noun} {source!r}; bundled are {names}", field=field
     )
 
 
-def _given(source: str, field: str) -> tuple[bytes, Path] | None:
-    """Return the text of standard input or of a file, and its path; None if there is no file."""
-    if source == "-":
-        return sys.stdin.buffer.read(), Path("-")
-    path = Path(source)
-    if not (path.is_file() or path.is_fifo()):
-        return None
+def _read_file(path: Path, field: str) -> bytes:
     try:
-        return _text(path), path
+        return _text(path)
     except OSError as error:
-        raise InvalidInputError(f"{error.strerror}: {source}", field=field) from None
+        raise InvalidInputError(f"{error.strerror}: {path}", field=field) from None
 
 
 def _decoded(text: bytes, kind: type[RequestT], path: Path) -> tuple[RequestT, Given[RequestT]]:
