@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from functools import partial
 from itertools import islice
@@ -13,12 +13,11 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
 
-import click
-
 import planner
 from hand_models.base import CruxError, InvalidInputError
 from service import bulk, processes, tables, wire
 from service.commands import options
+from service.commands.declaring import argument, command, flag, option
 
 if TYPE_CHECKING:
     from service.climbs import Listing
@@ -30,56 +29,37 @@ __all__ = [
     "complain",
     "exit_status",
     "is_listed",
-    "new_run",
     "writing_answers",
 ]
 
 LISTED_ENDINGS: Final = ".jsonl or .csv or .parquet"
 
 
-@click.command("batch")
-@click.argument("requests")
-@click.option(
-    "-o",
-    "--output",
-    "file",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Where the answers go: FILE.csv and FILE.parquet are tables, any other file "
-    "has the replies, one a line.",
-)
-@click.option(
-    "--columns", metavar="NAMES", help="Of a table: names with commas between, * in them."
-)
-@click.option(
-    "--resume",
-    is_flag=True,
-    help="Go on where a batch that was broken off ended: what FILE answers is not asked again.",
-)
-@click.option(
-    "--export",
-    is_flag=True,
-    help="Write the table of what a batch has answered so far, and ask nothing.",
-)
-@options.workers_options
-@click.option(
-    "--explain/--no-explain",
-    default=None,
-    help="Whether it is proven and named what is in the way where a stance is overloaded or "
-    "infeasible. By default replies do as their requests say, and tables leave it out.",
-)
-@options.own_options
-@options.json_option
+@command("batch")
 def batch_command(
-    requests: str,
-    file: Path | None,
-    columns: str | None,
-    resume: bool,
-    export: bool,
-    parallel: options.WorkersOption,
-    explain: bool | None,
-    own: options.Own,
-    as_json: bool,
+    requests: str = argument(),
+    file: Path | None = option(
+        "Where the answers go: FILE.csv and FILE.parquet are tables, any other file "
+        "has the replies, one a line.",
+        options.ANY_PATH,
+        usage="-o --output FILE",
+    ),
+    columns: str | None = option(
+        "Of a table: names with commas between, * in them.", usage="NAMES"
+    ),
+    resume: bool = flag(
+        "Go on where a batch that was broken off ended: what FILE answers is not asked again."
+    ),
+    export: bool = flag("Write the table of what a batch has answered so far, and ask nothing."),
+    parallel: options.WorkersOption = options.workers_options,
+    explain: bool | None = option(
+        "Whether it is proven and named what is in the way where a stance is overloaded or "
+        "infeasible. By default replies do as their requests say, and tables leave it out.",
+        usage="--explain/--no-explain",
+        default=None,
+    ),
+    own: options.Own = options.own_options,
+    as_json: bool = options.json_option,
 ) -> int:
     """Answer many plan requests: one a line in, one reply, row or error out, in order.
 
@@ -103,11 +83,15 @@ def batch_command(
     begun = perf_counter()
     with closing(bulk.Lines(requests)) as lines:
         explain = bool(explain) if is_table else explain
-        choose = partial(_columns, columns, own.robot, bool(explain))
         kept = resume or export
-        sink = new_run(
-            file, lines, choose, own, explained=bool(explain), resume=kept, shown=as_json
-        )
+        sink: bulk.Run
+        with writing_answers(file):
+            if file is not None and is_table:
+                chosen = _columns(columns, own.robot, bool(explain))
+                header = bulk.new_header(chosen, bool(explain), *own)
+                sink = bulk.TableLines(file, chosen, header, kept, lines)
+            else:
+                sink = bulk.ReplyLines(file, as_json, kept, lines)
         before = sink.tally.count
         on, workers = parallel.place(lines.count - before)
         answers = partial(
@@ -143,48 +127,6 @@ def writing_answers(file: Path | None) -> AbstractContextManager[None]:
         File of the answers; with None errors are left as they are.
     """
     return nullcontext() if file is None else tables.writing(file, "-o")
-
-
-def new_run(
-    file: Path | None,
-    asked: bulk.Asked,
-    columns: Callable[[], Sequence[bulk.Column]],
-    own: options.Own,
-    *,
-    explained: bool,
-    resume: bool,
-    shown: bool = False,
-) -> bulk.Run:
-    """Return the run that stores answers: rows of a table, lines of a file, or standard output.
-
-    Parameters
-    ----------
-    file : Path or None
-        File of the answers, a table if it ends in ``.csv`` or ``.parquet``; None for no file.
-    asked : Asked
-        All questions.
-    columns : callable
-        Returns the columns of a table; called for a table only.
-    own : Own
-        Hand and robot of the caller, which a table's header records.
-    explained : bool
-        True if the plans of a table are explained by certificates.
-    resume : bool
-        True to keep answers that the file already has.
-    shown : bool, optional
-        True to write replies to standard output if there is no file.
-
-    Returns
-    -------
-    ReplyLines or TableLines
-        Not yet open; its tally counts the answers that are kept.
-    """
-    with writing_answers(file):
-        if file is None or bulk.exporter_at(file) is None:
-            return bulk.ReplyLines(file, shown, resume, asked)
-        chosen = columns()
-        header = bulk.new_header(chosen, explained, *own)
-        return bulk.TableLines(file, chosen, header, resume, asked)
 
 
 def answer_rest(
@@ -363,8 +305,7 @@ def _print(tally: bulk.Tally, before: int, elapsed: float, file: Path | None) ->
         tables.number("median ms", "2", ".1f", scale=1e3),
         tables.number("longest ms", "3", ".1f", scale=1e3),
     )
-    if tables.verbosity() >= 0:
-        tables.print_rows(rows, columns, out)
+    tables.print_rows(rows, columns, out)
     done = tally.count - before
     rate = done / elapsed if elapsed > 0.0 else 0.0
     known = f", {before} were answered before" if before else ""

@@ -39,95 +39,66 @@ class Entry(NamedTuple):
     words: str
 
 
+WORDS_BY_MODULE: Final = {
+    "batch": {
+        "batch": "Answer many plan requests: one a line in, one reply, row or error out, in order.",
+    },
+    "holds": {
+        "holds": "Propose holds on ROCK, a mesh in metres (of a scan, `crux rock` makes one).",
+    },
+    "live": {
+        "play": "Send the set-points of a climb to a robot: publish them in time, until the "
+        "end or Ctrl-C.",
+        "stream": "Give set-points for one body wrench after another, read line by line.",
+        "view": "Open a page to drag the body and the hands on their rock; the plan follows.",
+    },
+    "network": {
+        "keys": "Make certificates and rights: who may ask a service, and who may only watch it.",
+        "query": "Ask a running service for a plan.",
+        "serve": "Answer questions on zenoh until SIGTERM or Ctrl-C.",
+        "top": "Show what a running service does, until Ctrl-C: clients, queue, workers, "
+        "streams, times.",
+    },
+    "plans": {
+        "demo": "Start the service, ask it for a plan of a real stance, and draw the answer.",
+        "new": "Write a commented start of a stance, a route, a robot or a hand, as TOML that "
+        "runs.",
+        "plan": "Make one plan, without the network.",
+        "redundancy": "Plan without each tile, finger and hand, one at a time, without moving.",
+        "schema": "Print the JSON Schema of every message.",
+    },
+    "rock": {
+        "rock": "Make a mesh hold of a scan: points, a grid of heights, or triangles.",
+    },
+    "routes": {
+        "climb": "Search for the best climb on each ROCK, with proof how much better any "
+        "other can be.",
+        "route": "Plan climbs: every stage, and every move between two stages.",
+    },
+    "spaces": {
+        "body-space": "Show what the body can bear: which wrenches, and which accelerations.",
+        "screen": "Rank stances by their load factors; solve only those that may be the best.",
+        "wrench-space": "Show what one hand can carry.",
+    },
+    "studies": {
+        "check": "Recompute what the certificate of a climb claims, without the search.",
+        "replay": "Ask all questions of a recording again, here, and say what has moved in "
+        "the answers.",
+        "study": "Run an experiment of the paper again, and compare its claims with the model.",
+    },
+    "sweep": {
+        "simulate": "Let tiles slip at random: count how often all hands hold, with new "
+        "set-points or without.",
+        "sweep": "Plan a stance over varied fields: a table, a picture, and where it stops "
+        "holding.",
+    },
+}
+"""First sentence of the help of each command, by the module of the command and its name."""
+
 COMMANDS_BY_NAME: Final = {
-    "batch": Entry(
-        "batch",
-        "Answer many plan requests: one a line in, one reply, row or error out, in order.",
-    ),
-    "body-space": Entry(
-        "spaces",
-        "Show what the body can bear: which wrenches, and which accelerations.",
-    ),
-    "check": Entry(
-        "studies",
-        "Recompute what the certificate of a climb claims, without the search.",
-    ),
-    "climb": Entry(
-        "routes",
-        "Search for the best climb on each ROCK, with proof how much better any other can be.",
-    ),
-    "demo": Entry(
-        "plans",
-        "Start the service, ask it for a plan of a real stance, and draw the answer.",
-    ),
-    "holds": Entry(
-        "holds",
-        "Propose holds on ROCK, a mesh in metres (of a scan, `crux rock` makes one).",
-    ),
-    "keys": Entry(
-        "keys",
-        "Make certificates and rights: who may ask a service, and who may only watch it.",
-    ),
-    "new": Entry(
-        "plans",
-        "Write a commented start of a stance, a route, a robot or a hand, as TOML that runs.",
-    ),
-    "plan": Entry("plans", "Make one plan, without the network."),
-    "play": Entry(
-        "live",
-        "Send the set-points of a climb to a robot: publish them in time, until the end or Ctrl-C.",
-    ),
-    "query": Entry("network", "Ask a running service for a plan."),
-    "redundancy": Entry(
-        "plans",
-        "Plan without each tile, finger and hand, one at a time, without moving.",
-    ),
-    "replay": Entry(
-        "network",
-        "Ask all questions of a recording again, here, and say what has moved in the answers.",
-    ),
-    "rock": Entry(
-        "rock",
-        "Make a mesh hold of a scan: points, a grid of heights, or triangles.",
-    ),
-    "route": Entry(
-        "routes",
-        "Plan climbs: every stage, and every move between two stages.",
-    ),
-    "schema": Entry("plans", "Print the JSON Schema of every message."),
-    "screen": Entry(
-        "spaces",
-        "Rank stances by their load factors; solve only those that may be the best.",
-    ),
-    "serve": Entry(
-        "network",
-        "Answer questions on zenoh until SIGTERM or Ctrl-C.",
-    ),
-    "simulate": Entry(
-        "sweep",
-        "Let tiles slip at random: count how often all hands hold, with new set-points or without.",
-    ),
-    "stream": Entry(
-        "live",
-        "Give set-points for one body wrench after another, read line by line.",
-    ),
-    "study": Entry(
-        "studies",
-        "Run an experiment of the paper again, and compare its claims with the model.",
-    ),
-    "sweep": Entry(
-        "sweep",
-        "Plan a stance over varied fields: a table, a picture, and where it stops holding.",
-    ),
-    "top": Entry(
-        "network",
-        "Show what a running service does, until Ctrl-C: clients, queue, workers, streams, times.",
-    ),
-    "view": Entry(
-        "live",
-        "Open a page to drag the body and the hands on their rock; the plan follows.",
-    ),
-    "wrench-space": Entry("spaces", "Show what one hand can carry."),
+    name: Entry(module, words)
+    for module, commands in WORDS_BY_MODULE.items()
+    for name, words in commands.items()
 }
 
 
@@ -186,18 +157,12 @@ class Commands(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write each command with its summary into the help, without loading the command."""
         limit = formatter.width - 6 - max(map(len, COMMANDS_BY_NAME))
+        short = {
+            name: click.Command(name, help=COMMANDS_BY_NAME[name].words).get_short_help_str(limit)
+            for name in self.list_commands(ctx)
+        }
         with formatter.section("Commands"):
-            formatter.write_dl(
-                [
-                    (
-                        name,
-                        click.Command(name, help=COMMANDS_BY_NAME[name].words).get_short_help_str(
-                            limit
-                        ),
-                    )
-                    for name in self.list_commands(ctx)
-                ]
-            )
+            formatter.write_dl([*short.items()])
 
     def shell_complete(
         self, ctx: click.Context, incomplete: str

@@ -15,6 +15,7 @@ import msgspec
 from hand_models.base import CruxError, InvalidInputError, whole_file
 from service import processes, tables
 from service.commands import options
+from service.commands.declaring import argument, command, option
 
 if TYPE_CHECKING:
     from hand_models import fixed_wrist
@@ -26,120 +27,81 @@ if TYPE_CHECKING:
 __all__ = ["holds_command"]
 
 
-@click.command("holds")
-@click.argument("rock", type=click.Path(path_type=Path))
-@click.option(
-    "-o",
-    "--output",
-    type=options.OutputFile(".json"),
-    required=True,
-    metavar="JSON",
-    help="Where the holds go, the best first, in metres and radians.",
-)
-@click.option(
-    "--spacing",
-    type=float,
-    default=0.05,
-    show_default=True,
-    help="Of the grid of points across z of the rock's frame [m].",
-)
-@click.option(
-    "--angles",
-    type=click.IntRange(1, 360),
-    default=4,
-    show_default=True,
-    help="Angles of the wrist at each point, evenly over a whole turn.",
-)
-@click.option(
-    "--outer-rotation",
-    "rotations",
-    type=options.FiniteRange(0.0, math.pi + 5e-4),
-    multiple=True,
-    default=(0.0, math.pi),
-    show_default="0 and π",
-    metavar="RAD",
-    help="Of the outer fingers; may be given more than once, and each is tried.",
-)
-@click.option("--surface", default="rock", show_default=True, help="A preset's name.")
-@click.option(
-    "--seat",
-    type=click.Choice(["rest", "best"]),
-    default="rest",
-    show_default=True,
-    help="How a hand is seated at a point; best takes some forty times as long.",
-)
-@click.option(
-    "--placing",
-    type=click.Choice(["given", "contact"]),
-    default="given",
-    show_default=True,
-    help="contact moves a hand from its seat to where, closed, it rests on the rock; takes some "
-    "forty times as long.",
-)
-@click.option(
-    "--samples",
-    type=click.IntRange(0, 1024),
-    default=8,
-    show_default=True,
-    metavar="N",
-    help="Places about each one at which the hand is tried, too; 0 leaves them out.",
-)
-@click.option(
-    "--robust",
-    type=click.IntRange(0),
-    default=100,
-    show_default=True,
-    metavar="N",
-    help="Of the N places that are best without samples, samples are tried.",
-)
-@click.option(
-    "--direction",
-    type=click.Choice(["-fz", "-fx", "+fx", "-fy", "+fy"]),
-    default="-fz",
-    show_default=True,
-    help="Of the force on the rock that is wanted, in the hand's frame H; -fz pulls the hand off.",
-)
-@click.option(
-    "--force",
-    type=options.FiniteRange(0.0, 1e6, min_open=True),
-    default=0.1,
-    show_default=True,
-    metavar="N",
-    help="Wanted force along the direction alone, for the share of samples that hold it.",
-)
-@click.option(
-    "--sort",
-    "by",
-    type=click.Choice(["robust", "share", "pure", "support"]),
-    show_default="robust; pure without samples",
-    help="robust: the force along the direction alone that nine in ten samples hold; share: the "
-    "samples that hold --force; pure: the force alone where the hand is put; support: with "
-    "whatever other forces and moments.",
-)
-@options.workers_options
-@options.hand_option
-@options.plot_option("Draw the rock there, and on it the largest pull-off at each point.")
-@options.page_option
-@options.json_option
+@command("holds")
 def holds_command(
-    rock: Path,
-    output: Path,
-    spacing: float,
-    angles: int,
-    rotations: tuple[float, ...],
-    surface: str,
-    seat: Literal["rest", "best"],
-    placing: Placing,
-    samples: int,
-    robust: int,
-    direction: str,
-    force: float,
-    by: fixed_wrist.HoldRank | None,
-    parallel: options.WorkersOption,
-    hand: ParameterTable | None,
-    picture: Path | None,
-    page: Path | None,
-    as_json: bool,
+    rock: Path = argument(options.ANY_PATH),
+    output: Path = option(
+        "Where the holds go, the best first, in metres and radians.",
+        options.OutputFile(".json"),
+        usage="-o --output JSON",
+        required=True,
+    ),
+    spacing: float = option(
+        "Of the grid of points across z of the rock's frame [m].", default=0.05
+    ),
+    angles: int = option(
+        "Angles of the wrist at each point, evenly over a whole turn.",
+        click.IntRange(1, 360),
+        default=4,
+    ),
+    rotations: tuple[float, ...] = option(
+        "Of the outer fingers; may be given more than once, and each is tried.",
+        options.FiniteRange(0.0, math.pi + 5e-4),
+        usage="--outer-rotation RAD",
+        multiple=True,
+        default=(0.0, math.pi),
+        show_default="0 and π",
+    ),
+    surface: str = option("A preset's name.", default="rock"),
+    seat: Literal["rest", "best"] = option(
+        "How a hand is seated at a point; best takes some forty times as long.",
+        click.Choice(["rest", "best"]),
+        default="rest",
+    ),
+    placing: Placing = option(
+        "contact moves a hand from its seat to where, closed, it rests on the rock; takes some "
+        "forty times as long.",
+        click.Choice(["given", "contact"]),
+        default="given",
+    ),
+    samples: int = option(
+        "Places about each one at which the hand is tried, too; 0 leaves them out.",
+        click.IntRange(0, 1024),
+        default=8,
+        usage="N",
+    ),
+    robust: int = option(
+        "Of the N places that are best without samples, samples are tried.",
+        click.IntRange(0),
+        default=100,
+        usage="N",
+    ),
+    direction: str = option(
+        "Of the force on the rock that is wanted, in the hand's frame H; -fz pulls the hand off.",
+        click.Choice(["-fz", "-fx", "+fx", "-fy", "+fy"]),
+        default="-fz",
+    ),
+    force: float = option(
+        "Wanted force along the direction alone, for the share of samples that hold it.",
+        options.FiniteRange(0.0, 1e6, min_open=True),
+        default=0.1,
+        usage="N",
+    ),
+    by: fixed_wrist.HoldRank | None = option(
+        "robust: the force along the direction alone that nine in ten samples hold; share: the "
+        "samples that hold --force; pure: the force alone where the hand is put; support: with "
+        "whatever other forces and moments.",
+        click.Choice(["robust", "share", "pure", "support"]),
+        usage="--sort",
+        show_default="robust; pure without samples",
+    ),
+    parallel: options.WorkersOption = options.workers_options,
+    hand: ParameterTable | None = options.hand_option,
+    picture: Path | None = options.plot_option(
+        "Draw the rock there, and on it the largest pull-off at each point."
+    ),
+    page: Path | None = options.page_option,
+    as_json: bool = options.json_option,
 ) -> int:
     """Propose holds on ROCK, a mesh in metres (of a scan, `crux rock` makes one).
 

@@ -19,6 +19,7 @@ import planner
 from hand_models.base import InvalidInputError, Strict, UnsupportedError
 from service import answering, bulk, replies, requests, serving, tables, viewing, wire
 from service.commands import options, stances
+from service.commands.declaring import argument, command, flag, option
 from service.commands.network import zenoh_options
 
 if TYPE_CHECKING:
@@ -27,18 +28,17 @@ if TYPE_CHECKING:
 __all__ = ["play_command", "stream_command", "view_command"]
 
 
-@click.command("stream")
-@options.stance_argument
-@click.option(
-    "--radius",
-    type=options.FiniteRange(min=0.0, min_open=True, max=1e4),
-    default=30.0,
-    show_default=True,
-    help="Of interpolations along a force; along a moment a tenth of it, per metre [N].",
-)
-@options.own_options
-@options.json_option
-def stream_command(stance: str, radius: float, own: options.Own, as_json: bool) -> int:
+@command("stream")
+def stream_command(
+    stance: str = options.stance_argument,
+    radius: float = option(
+        "Of interpolations along a force; along a moment a tenth of it, per metre [N].",
+        options.FiniteRange(min=0.0, min_open=True, max=1e4),
+        default=30.0,
+    ),
+    own: options.Own = options.own_options,
+    as_json: bool = options.json_option,
+) -> int:
     """Give set-points for one body wrench after another, read line by line.
 
     Each line of standard input is a JSON list of six numbers, a body wrench in B, force first
@@ -96,39 +96,26 @@ def stream_command(stance: str, radius: float, own: options.Own, as_json: bool) 
     return worst
 
 
-@click.command("view")
-@options.stance_argument
-@click.option(
-    "-o",
-    "--output",
-    "output",
-    type=options.OutputFile(".json"),
-    metavar="FILE",
-    help="Where the page's button saves the moved stance; by default STANCE-moved.json.",
-)
-@click.option(
-    "--port",
-    type=click.IntRange(0, 65535),
-    default=0,
-    metavar="PORT",
-    help="Of the page, on this machine; by default any that is free.",
-)
-@click.option("--no-browser", is_flag=True, help="Print the page's address, and open no browser.")
-@click.option(
-    "--follow", is_flag=True, help="Show the set-points and slips that a service publishes."
-)
-@zenoh_options
-@options.own_options
-@options.json_option
+@command("view")
 def view_command(
-    stance: str,
-    output: Path | None,
-    port: int,
-    no_browser: bool,
-    follow: bool,
-    config: zenoh.Config,
-    own: options.Own,
-    as_json: bool,
+    stance: str = options.stance_argument,
+    output: Path | None = option(
+        "Where the page's button saves the moved stance; by default STANCE-moved.json.",
+        options.OutputFile(".json"),
+        usage="-o --output FILE",
+    ),
+    port: int = option(
+        "Of the page, on this machine; by default any that is free.",
+        click.IntRange(0, 65535),
+        default=0,
+        usage="PORT",
+        show_default=False,
+    ),
+    no_browser: bool = flag("Print the page's address, and open no browser."),
+    follow: bool = flag("Show the set-points and slips that a service publishes."),
+    config: zenoh.Config = zenoh_options,
+    own: options.Own = options.own_options,
+    as_json: bool = options.json_option,
 ) -> int:
     """Open a page to drag the body and the hands on their rock; the plan follows. Ctrl-C ends it.
 
@@ -174,41 +161,29 @@ def view_command(
     return tables.ExitStatus.DONE
 
 
-@click.command("play")
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@zenoh_options
-@click.option(
-    "--rate",
-    type=options.FiniteRange(1.0, 1e4),
-    default=100.0,
-    show_default=True,
-    metavar="HZ",
-    help="Least number of set-points in a second.",
-)
-@click.option(
-    "--speed",
-    type=options.FiniteRange(0.0, min_open=True, max=100.0),
-    default=1.0,
-    show_default=True,
-    help="Time of the climb over time that passes; 1 keeps the controller's rates.",
-)
-@click.option("--up-to-failure", is_flag=True, help="Play a climb that ends in the middle, too.")
-@click.option(
-    "--wait",
-    type=options.FiniteRange(0.0, 1e6),
-    metavar="SECONDS",
-    help="Wait so long for a subscriber, the robot's controller; by default "
-    f"{serving.SERVING_SETTINGS.search_timeout:g}.",
-)
-@options.json_option
+@command("play")
 def play_command(
-    folder: Path,
-    config: zenoh.Config,
-    rate: float,
-    speed: float,
-    up_to_failure: bool,
-    wait: float | None,
-    as_json: bool,
+    folder: Path = argument(options.ANY_PATH, metavar="DIR"),
+    config: zenoh.Config = zenoh_options,
+    rate: float = option(
+        "Least number of set-points in a second.",
+        options.FiniteRange(1.0, 1e4),
+        default=100.0,
+        usage="HZ",
+    ),
+    speed: float = option(
+        "Time of the climb over time that passes; 1 keeps the controller's rates.",
+        options.FiniteRange(0.0, min_open=True, max=100.0),
+        default=1.0,
+    ),
+    up_to_failure: bool = flag("Play a climb that ends in the middle, too."),
+    wait: float | None = option(
+        "Wait so long for a subscriber, the robot's controller; by default "
+        f"{serving.SERVING_SETTINGS.search_timeout:g}.",
+        options.FiniteRange(0.0, 1e6),
+        usage="SECONDS",
+    ),
+    as_json: bool = options.json_option,
 ) -> None:
     """Send the set-points of a climb to a robot: publish them in time, until the end or Ctrl-C.
 

@@ -1,4 +1,4 @@
-"""Define the commands of a service: serve, query, top, and replay of what was recorded."""
+"""Define the commands of a service: serve, query, top, and keys of who may ask it."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import gc
 import logging
 import os
 import time
-from collections.abc import Callable
 from contextlib import ExitStack
-from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,21 +15,14 @@ import click
 import planner
 from hand_models import hand
 from hand_models.base import InvalidInputError
-from service import (
-    operating,
-    recording,
-    requests,
-    ros2 as ros,
-    serving,
-    tables,
-    wire,
-)
+from service import operating, recording, requests, ros2 as ros, security, serving, tables, wire
 from service.commands import options, stances
+from service.commands.declaring import argument, command, flag, group, option
 
 if TYPE_CHECKING:
     import zenoh
 
-__all__ = ["query_command", "replay_command", "serve_command", "top_command"]
+__all__ = ["keys_command", "query_command", "serve_command", "top_command", "zenoh_options"]
 
 
 def _configuration(
@@ -52,99 +43,65 @@ def _configuration(
     return zenoh_files[-1] if zenoh_files else None if named is None else Path(named)
 
 
-def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add zenoh's flags to a click command; the command gets them as one ``config`` argument.
+def _zenoh_config(no_multicast_scouting: bool, **flags: Any) -> zenoh.Config:
+    return serving.zenoh_config(**flags, multicast=not no_multicast_scouting)
 
-    Parameters
-    ----------
-    command : callable
-        Function of the command, with a keyword argument ``config`` of type `zenoh.Config`.
-    """
 
-    @click.option(
-        "-m", "--mode", type=click.Choice(serving.SESSION_MODES), help="Zenoh session mode."
-    )
-    @click.option("-e", "--connect", multiple=True, metavar="ENDPOINT", help="Connect to it.")
-    @click.option("-l", "--listen", multiple=True, metavar="ENDPOINT", help="Listen on it.")
-    @click.option(
-        "-c",
-        "--config",
-        "file",
-        type=click.Path(path_type=Path),
+zenoh_options = group(
+    _zenoh_config,
+    mode=option("Zenoh session mode.", click.Choice(serving.SESSION_MODES), usage="-m --mode"),
+    connect=option("Connect to it.", usage="-e --connect ENDPOINT", multiple=True),
+    listen=option("Listen on it.", usage="-l --listen ENDPOINT", multiple=True),
+    file=option(
+        "Zenoh JSON5 configuration; of crux serve also a TOML file with these options.",
+        options.ANY_PATH,
+        usage="-c --config",
         multiple=True,
         is_eager=True,
         callback=_configuration,
-        help="Zenoh JSON5 configuration; of crux serve also a TOML file with these options.",
-    )
-    @click.option("--cfg", "settings", multiple=True, metavar="KEY:VALUE", help="One setting.")
-    @click.option("--no-multicast-scouting", is_flag=True, help="Look for nobody by multicast.")
-    @wraps(command)
-    def with_config(no_multicast_scouting: bool, **given: Any) -> Any:
-        names = ("mode", "connect", "listen", "file", "settings")
-        flags = {name: given.pop(name) for name in names}
-        with operating.naming_file(click.get_current_context()):
-            config = serving.zenoh_config(**flags, multicast=not no_multicast_scouting)
-            return command(config=config, **given)
-
-    return with_config
+    ),
+    settings=option("One setting.", usage="--cfg KEY:VALUE", multiple=True),
+    no_multicast_scouting=flag("Look for nobody by multicast."),
+)
+"""Zenoh's flags, of which a command gets a configuration."""
 
 
-@click.command("serve")
-@zenoh_options
-@options.own_options
-@click.option(
-    "--workers",
-    type=click.IntRange(1, 256),
-    help="Processes that answer; by default one a core, but at least 2. One more has the streams.",
-)
-@click.option(
-    "--deadline",
-    "seconds",
-    type=options.FiniteRange(0.0, min_open=True, max=requests.LONGEST_DEADLINE),
-    default=requests.DEFAULT_DEADLINE,
-    show_default=True,
-    metavar="SECONDS",
-    help="Of a question that names none, from its arrival.",
-)
-@click.option(
-    "--metrics-port",
-    type=click.IntRange(1, 65535),
-    help="Give Prometheus its text over HTTP on this port of this machine.",
-)
-@click.option("--log-format", type=click.Choice(["text", "json"]), default="text")
-@click.option("--ros2", is_flag=True, help="Be a node of ROS 2, too, by rmw_zenoh's convention.")
-@click.option(
-    "--domain",
-    type=click.IntRange(0, 232),
-    help="ROS domain of --ros2; by default that of ROS_DOMAIN_ID, or 0.",
-)
-@click.option(
-    "--record",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE.mcap",
-    help="Record questions and answers there; if the file exists, in FILE-2.mcap, and so on.",
-)
-@click.option(
-    "--record-limit",
-    type=options.FiniteRange(0.01, 1e6),
-    metavar="GB",
-    help="Of all files of --record together: the oldest are deleted.",
-)
-@click.option("--check", is_flag=True, help="Say what would be served, and start nothing.")
-@options.json_option
+@command("serve", within=operating.naming_file)
 def serve_command(
-    config: zenoh.Config,
-    own: options.Own,
-    workers: int | None,
-    seconds: float,
-    metrics_port: int | None,
-    log_format: str,
-    ros2: bool,
-    domain: int | None,
-    record: Path | None,
-    record_limit: float | None,
-    check: bool,
-    as_json: bool,
+    config: zenoh.Config = zenoh_options,
+    own: options.Own = options.own_options,
+    workers: int | None = option(
+        "Processes that answer; by default one a core, but at least 2. One more has the streams.",
+        click.IntRange(1, 256),
+    ),
+    seconds: float = option(
+        "Of a question that names none, from its arrival.",
+        options.FiniteRange(0.0, min_open=True, max=requests.LONGEST_DEADLINE),
+        usage="--deadline SECONDS",
+        default=requests.DEFAULT_DEADLINE,
+    ),
+    metrics_port: int | None = option(
+        "Give Prometheus its text over HTTP on this port of this machine.", click.IntRange(1, 65535)
+    ),
+    log_format: str = option(
+        None, click.Choice(["text", "json"]), default="text", show_default=False
+    ),
+    ros2: bool = flag("Be a node of ROS 2, too, by rmw_zenoh's convention."),
+    domain: int | None = option(
+        "ROS domain of --ros2; by default that of ROS_DOMAIN_ID, or 0.", click.IntRange(0, 232)
+    ),
+    record: Path | None = option(
+        "Record questions and answers there; if the file exists, in FILE-2.mcap, and so on.",
+        click.Path(path_type=Path, dir_okay=False),
+        usage="FILE.mcap",
+    ),
+    record_limit: float | None = option(
+        "Of all files of --record together: the oldest are deleted.",
+        options.FiniteRange(0.01, 1e6),
+        usage="GB",
+    ),
+    check: bool = flag("Say what would be served, and start nothing."),
+    as_json: bool = options.json_option,
 ) -> None:
     """Answer questions on zenoh until SIGTERM or Ctrl-C.
 
@@ -249,30 +206,23 @@ def serve_command(
 
 def _say_checked(found: dict[str, Any], as_json: bool) -> None:
     """Print what would be served; with verbosity -1 only as JSON."""
-    if tables.verbosity() < 0 and not as_json:
-        return
     if as_json:
         tables.say({"v": 1} | {key.replace(" ", "_"): value for key, value in found.items()})
-        return
-    for word, value in found.items():
-        text = ", ".join(map(str, value)) if isinstance(value, list | tuple) else value
-        tables.console().print(f"{word}: {'none' if text in (None, '') else text}", markup=False)
+    elif tables.verbosity() >= 0:
+        out = tables.console()
+        for word, value in found.items():
+            text = ", ".join(map(str, value)) if isinstance(value, list | tuple) else value
+            out.print(f"{word}: {'none' if text in (None, '') else text}", markup=False)
 
 
-@click.command("query")
-@options.stance_argument
-@zenoh_options
-@options.timeout_option
-@options.wait_option
-@options.own_options
-@options.json_option
+@command("query")
 def query_command(
-    stance: str,
-    config: zenoh.Config,
-    timeout: float | None,
-    wait: float | None,
-    own: options.Own,
-    as_json: bool,
+    stance: str = options.stance_argument,
+    config: zenoh.Config = zenoh_options,
+    timeout: float | None = options.timeout_option,
+    wait: float | None = options.wait_option,
+    own: options.Own = options.own_options,
+    as_json: bool = options.json_option,
 ) -> int:
     """Ask a running service for a plan.
 
@@ -286,25 +236,18 @@ def query_command(
     return tables.show(reply, as_json)
 
 
-@click.command("top")
-@zenoh_options
-@options.robot_option
-@click.option(
-    "--interval",
-    type=options.FiniteRange(0.1, 3600.0),
-    default=2.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="Between two looks at the service.",
-)
-@click.option("--once", is_flag=True, help="Look once: all questions since the service's start.")
-@options.json_option
+@command("top")
 def top_command(
-    config: zenoh.Config,
-    robot: planner.RobotFile | None,
-    interval: float,
-    once: bool,
-    as_json: bool,
+    config: zenoh.Config = zenoh_options,
+    robot: planner.RobotFile | None = options.robot_option,
+    interval: float = option(
+        "Between two looks at the service.",
+        options.FiniteRange(0.1, 3600.0),
+        default=2.0,
+        usage="SECONDS",
+    ),
+    once: bool = flag("Look once: all questions since the service's start."),
+    as_json: bool = options.json_option,
 ) -> None:
     """Show what a running service does, until Ctrl-C: clients, queue, workers, streams, times.
 
@@ -343,28 +286,99 @@ def top_command(
                 before, now = now, operating.read_snapshot(session, name, timeout)
 
 
-@click.command("replay")
-@click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
-@options.own_options
-@options.json_option
-def replay_command(file: Path, own: options.Own, as_json: bool) -> int:
-    """Ask all questions of a recording again, here, and say what has moved in the answers.
+@click.group("keys")
+def keys_command() -> None:
+    """Make certificates and rights: who may ask a service, and who may only watch it.
 
-    FILE is one of crux serve --record. Answers are compared to the digit, without identifiers and
-    times on a clock. The exit status is 3 if an answer has moved. The hand is the recorded
-    service's unless --hand gives another; of a robot of your own, give --robot again.
+    DIR is the folder that crux keys make makes. It has a zenoh configuration for each name, for -c
+    of crux serve and of all clients.
     """
-    recorded = recording.Recording(file)
-    replay = recording.Replay(recorded, own.robots, own.hand)
-    with tables.progress("replaying", line=f"replaying {file}") as step:
-        for _ in replay.run(recorded.questions(step)):
-            pass
-    operating.note_losses(recorded, file)
+
+
+folder_argument = argument(options.ANY_PATH, metavar="DIR")
+hosts_option = option(
+    "Name or address of the machine that listens, as others reach it; may be repeated.",
+    usage="--host HOST",
+    multiple=True,
+)
+days_option = option("Validity of the certificates.", click.IntRange(1, 3650), default=365)
+
+
+@command("make", of=keys_command)
+def make_command(
+    folder: Path = folder_argument,
+    hosts: tuple[str, ...] = hosts_option,
+    port: int = option(None, click.IntRange(1, 65535), default=7447),
+    days: int = days_option,
+    robot: str = option(
+        "Robot for whose keys the rights are.", default=wire.DEFAULT_ROBOT, usage="NAME"
+    ),
+    domain: int | None = option(
+        "ROS domain of crux serve --ros2; its nodes get a certificate, too.", click.IntRange(0, 232)
+    ),
+    as_json: bool = options.json_option,
+) -> None:
+    """Make an authority, and keys of a service, a planner and an observer.
+
+    Without --host, they are for this machine alone.
+    """
+    where = hosts or ("localhost", "127.0.0.1")
+    made = security.KeyFolder.make(folder, robot, where, port, days, domain)
+    _tell_names(made, as_json)
+    tables.remark(f"{folder}/ca-key.pem makes further names: keep it where nobody else reads it")
+
+
+@command("add", of=keys_command)
+def add_command(
+    folder: Path = folder_argument,
+    name: str = argument(metavar="NAME"),
+    role: str = option(None, click.Choice([*map(str, security.Role)]), required=True),
+    hosts: tuple[str, ...] = hosts_option,
+    days: int = days_option,
+    as_json: bool = options.json_option,
+) -> None:
+    """Make the key of another name, and give it the rights of its role."""
+    keys = security.KeyFolder(folder)
+    changed = keys.add(name, security.Role(role), hosts, days)
+    _tell_names(keys, as_json)
+    _tell_changed(changed)
+
+
+@command("remove", of=keys_command)
+def remove_command(
+    folder: Path = folder_argument,
+    name: str = argument(metavar="NAME"),
+    as_json: bool = options.json_option,
+) -> None:
+    """Take all rights from a name, and remove its configuration."""
+    keys = security.KeyFolder(folder)
+    changed = keys.remove(name)
+    _tell_names(keys, as_json)
+    _tell_changed(changed)
+
+
+@command("list", of=keys_command)
+def list_command(
+    folder: Path = folder_argument,
+    as_json: bool = options.json_option,
+) -> None:
+    """List names, roles, hosts, and until when they are valid."""
+    _tell_names(security.KeyFolder(folder), as_json)
+
+
+def _tell_names(keys: security.KeyFolder, as_json: bool) -> None:
     if as_json:
-        tables.say(operating.replay_json(replay))
-    else:
-        operating.print_replay(replay, tables.console())
-    if replay.moved:
-        return tables.ExitStatus.OVERLOADED
-    lost = recorded.damaged or (recorded.whole is False and not replay.asked)
-    return tables.ExitStatus.FAILED if lost else tables.ExitStatus.DONE
+        tables.say({"v": 1, "folder": str(keys.path), "names": keys.names})
+        return
+    for each in keys.names:
+        hosts = f", at {', '.join(each.hosts)}" if each.hosts else ""
+        line = f"{keys.path / each.name}.json5: {each.role}, until {each.until:%Y-%m-%d}{hosts}"
+        tables.console().print(line, soft_wrap=True, highlight=False)
+
+
+def _tell_changed(changed: list[Path]) -> None:
+    if changed:
+        tables.remark(
+            f"changed: {', '.join(map(str, changed))}; copy them to their machines and start those "
+            "services anew: the rights are read at the start"
+        )

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
@@ -16,18 +14,20 @@ import planner
 from hand_models.base import InvalidInputError, installed_version, to_install
 from service import answering, bulk, processes, requests, serving, tables
 from service.commands import stances
+from service.commands.declaring import argument, flag, group, option
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
 
 __all__ = [
+    "ANY_PATH",
+    "FOLDER_PATH",
     "PICTURE_ENDINGS",
     "FiniteRange",
     "OutputFile",
     "Own",
     "Wanted",
     "WorkersOption",
-    "asked_for",
     "folder_option",
     "hand_option",
     "json_option",
@@ -41,15 +41,19 @@ __all__ = [
     "stance_argument",
     "timeout_option",
     "wait_option",
-    "wanted_options",
     "with_extras",
     "workers_options",
 ]
 
 RequestT = TypeVar("RequestT", requests.PlanRequest, requests.RouteRequest, requests.ClimbRequest)
-Command = Callable[..., Any]
 
 PICTURE_ENDINGS: Final = (".png", ".pdf", ".svg")
+
+ANY_PATH: Final = click.Path(path_type=Path)
+"""Type of the path of a file or a folder."""
+
+FOLDER_PATH: Final = click.Path(path_type=Path, file_okay=False)
+"""Type of the path of a folder."""
 
 # Types of values ----------------------------------------------------------------------------------
 
@@ -111,35 +115,6 @@ class InputFile(click.Path):
 
 
 # Options that commands have in common -------------------------------------------------------------
-
-
-def asked_for(
-    kind: Any, name: str, *options: Callable[[Command], Command]
-) -> Callable[[Command], Command]:
-    """Return a decorator that adds options to a command and passes their values as a named tuple.
-
-    Parameters
-    ----------
-    kind : type
-        Named tuple; its fields have the names of the options' parameters.
-    name : str
-        Command's parameter that gets the named tuple.
-    *options : callable
-        Click option decorators, in the order in which help shows them.
-    """
-
-    def decorate(command: Command) -> Command:
-        @wraps(command)
-        def called(**given: Any) -> Any:
-            fields = {field: given.pop(field) for field in kind._fields}
-            return command(**given, **{name: kind(**fields)})
-
-        made: Command = called
-        for option in reversed(options):
-            made = option(made)
-        return made
-
-    return decorate
 
 
 class Own(NamedTuple):
@@ -287,114 +262,87 @@ def _limbs(context: click.Context, _: click.Parameter, begun: str) -> list[Compl
     )
 
 
-stance_argument = click.argument(
-    "stance", shell_complete=stances.beginning_so(stances.bundled(), files=True)
+_route_or_file = stances.beginning_so(stances.bundled(requests.RouteRequest), files=True)
+
+stance_argument = argument(shell_complete=stances.beginning_so(stances.bundled(), files=True))
+routes_argument = argument(
+    nargs=-1, required=True, metavar="ROUTE...", shell_complete=_route_or_file
 )
-_routes = stances.beginning_so(stances.bundled(requests.RouteRequest), files=True)
-routes_argument = click.argument(
-    "routes", nargs=-1, required=True, metavar="ROUTE...", shell_complete=_routes
-)
-json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
-page_option = click.option(
-    "--html",
-    "page",
-    type=OutputFile(".html"),
+json_option = flag("Print JSON, and nothing else.", usage="--json")
+page_option = option(
+    "Page for a browser to write: one file, which loads nothing else.",
+    OutputFile(".html"),
+    usage="--html FILE",
     callback=_check_output,
-    metavar="FILE",
-    help="Page for a browser to write: one file, which loads nothing else.",
 )
-hand_option = click.option(
-    "--hand",
-    type=click.Path(path_type=Path),
+hand_option = option(
+    "TOML with numbers of a hand of your own; all others are the bundled hand's.",
+    ANY_PATH,
     multiple=True,
     callback=_read_hand,
-    metavar="FILE",
-    help="TOML with numbers of a hand of your own; all others are the bundled hand's.",
+    usage="FILE",
 )
-limb_option = click.option(
-    "--hand",
-    "limb_and_hand",
+limb_option = option(
+    "Whose wrench space. A second --hand FILE, ending in .toml, has numbers of a hand of your "
+    "own; all others are the bundled hand's.",
+    usage="--hand LIMB",
     required=True,
     multiple=True,
     callback=_limb_and_hand,
     shell_complete=_limbs,
-    metavar="LIMB",
-    help="Whose wrench space. A second --hand FILE, ending in .toml, has numbers of a hand of your "
-    "own; all others are the bundled hand's.",
 )
-robot_option = click.option(
-    "--robot",
-    type=InputFile("read_robot"),
-    metavar="FILE",
-    help="TOML that describes a robot of your own, and names its URDF.",
+robot_option = option(
+    "TOML that describes a robot of your own, and names its URDF.",
+    InputFile("read_robot"),
+    usage="FILE",
 )
-own_options = asked_for(Own, "own", hand_option, robot_option)
+own_options = group(Own, hand=hand_option, robot=robot_option)
 
-explain_option = click.option(
-    "--no-explain",
-    "unexplained",
-    is_flag=True,
-    help="Leave out the proof of what is in the way where a stance is overloaded or infeasible.",
+explain_option = flag(
+    "Leave out the proof of what is in the way where a stance is overloaded or infeasible.",
+    usage="--no-explain",
 )
-spread_option = click.option(
-    "--spread",
-    is_flag=True,
-    help="And how far utilisation and load factor spread over what is not known of hand and rock.",
+spread_option = flag(
+    "And how far utilisation and load factor spread over what is not known of hand and rock."
 )
-draws_option = click.option(
-    "--draws",
-    type=InputFile("read_draws"),
-    metavar="FILE",
-    help="TOML with samples of your own for the spread; with it, --spread need not be given.",
+draws_option = option(
+    "TOML with samples of your own for the spread; with it, --spread need not be given.",
+    InputFile("read_draws"),
+    usage="FILE",
 )
-wanted_options = asked_for(Wanted, "wanted", draws_option, explain_option)
-"""Options of `Wanted` but `spread_option`, which a command adds itself."""
 
-timeout_option = click.option(
-    "--timeout",
-    type=FiniteRange(0.01, 1e6),
-    help=f"[s]; by default {serving.SERVING_SETTINGS.client_timeout:g}, or what the deadline of "
+timeout_option = option(
+    f"[s]; by default {serving.SERVING_SETTINGS.client_timeout:g}, or what the deadline of "
     "the request takes.",
+    FiniteRange(0.01, 1e6),
 )
-wait_option = click.option(
-    "--wait",
-    type=FiniteRange(0.0, 1e6),
-    metavar="SECONDS",
-    help="Wait so long for a service that is not there yet.",
+wait_option = option(
+    "Wait so long for a service that is not there yet.", FiniteRange(0.0, 1e6), usage="SECONDS"
 )
-workers_options = asked_for(
+workers_options = group(
     WorkersOption,
-    "parallel",
-    click.option(
-        "--workers",
-        type=click.IntRange(min=1),
-        help="Processes; by default as many as are worth it.",
-    ),
-    click.option(
-        "--dask",
-        metavar="ADDRESS",
-        callback=_check_dask,
-        help="Plan on the Dask cluster whose scheduler is at tcp://HOST:PORT; local is one of this "
+    workers=option("Processes; by default as many as are worth it.", click.IntRange(min=1)),
+    dask=option(
+        "Plan on the Dask cluster whose scheduler is at tcp://HOST:PORT; local is one of this "
         "machine's own.",
+        usage="ADDRESS",
+        callback=_check_dask,
     ),
 )
 
 
-def plot_option(text: str) -> Callable[[Command], Command]:
-    """Return the option ``--plot`` with a help text; the command gets the path as ``picture``."""
+def plot_option(text: str) -> Any:
+    """Return the option ``--plot`` with a help text, for the parameter of a picture's path."""
     kind, check = OutputFile(*PICTURE_ENDINGS), _check_output
-    return click.option("--plot", "picture", type=kind, callback=check, metavar="FILE", help=text)
+    return option(text, kind, usage="--plot FILE", callback=check)
 
 
-def folder_option(text: str) -> Callable[[Command], Command]:
-    """Return the option ``--output`` of a folder; the command gets the path as ``folder``."""
-    return click.option(
-        "-o",
-        "--output",
-        "folder",
-        type=click.Path(path_type=Path, file_okay=False),
+def folder_option(text: str) -> Any:
+    """Return the option ``--output`` of a folder, with a help text."""
+    return option(
+        text,
+        FOLDER_PATH,
+        usage="-o --output DIR",
         callback=_check_folder,
         required=True,
-        metavar="DIR",
-        help=text,
     )

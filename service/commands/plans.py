@@ -17,6 +17,7 @@ import planner
 from hand_models.base import InvalidInputError, whole_file
 from service import answering, replies, requests, serving, tables, wire
 from service.commands import options, stances
+from service.commands.declaring import argument, command, flag, group, option
 
 __all__ = [
     "demo_command",
@@ -29,45 +30,27 @@ __all__ = [
 ResultT = TypeVar("ResultT")
 
 
-@click.command("plan")
-@options.stance_argument
-@options.plot_option("Draw it there.")
-@options.page_option
-@click.option(
-    "--robust",
-    is_flag=True,
-    help="And the least load factor where every hand is a little elsewhere.",
-)
-@click.option(
-    "--open-loop",
-    is_flag=True,
-    help="And the utilisation where hands are displaced and the plan is executed as it is.",
-)
-@options.spread_option
-@click.option(
-    "--clearance", is_flag=True, help="And the least distances of body, hands, links and rock."
-)
-@click.option(
-    "--advice",
-    "advice_folder",
-    type=click.Path(path_type=Path, file_okay=False),
-    metavar="DIR",
-    help="Write what would make it hold there, each advice as a STANCE of its own.",
-)
-@options.wanted_options
-@options.own_options
-@options.json_option
+@command("plan")
 def plan_command(
-    stance: str,
-    picture: Path | None,
-    page: Path | None,
-    robust: bool,
-    open_loop: bool,
-    clearance: bool,
-    advice_folder: Path | None,
-    wanted: options.Wanted,
-    own: options.Own,
-    as_json: bool,
+    stance: str = options.stance_argument,
+    picture: Path | None = options.plot_option("Draw it there."),
+    page: Path | None = options.page_option,
+    robust: bool = flag("And the least load factor where every hand is a little elsewhere."),
+    open_loop: bool = flag(
+        "And the utilisation where hands are displaced and the plan is executed as it is."
+    ),
+    spread: bool = options.spread_option,
+    clearance: bool = flag("And the least distances of body, hands, links and rock."),
+    advice_folder: Path | None = option(
+        "Write what would make it hold there, each advice as a STANCE of its own.",
+        options.FOLDER_PATH,
+        usage="--advice DIR",
+    ),
+    wanted: options.Wanted = group(
+        options.Wanted, draws=options.draws_option, unexplained=options.explain_option
+    ),
+    own: options.Own = options.own_options,
+    as_json: bool = options.json_option,
 ) -> int:
     """Make one plan, without the network."""
     further: dict[planner.Want, bool] = {
@@ -79,7 +62,9 @@ def plan_command(
     request, given = stances.read_with_text(stance)
     plain = own.asked(request)
     extras = [want for want, chosen in further.items() if chosen]
-    request = options.with_extras(wanted.of(plain), *extras, whole=not as_json)
+    request = options.with_extras(
+        wanted._replace(spread=spread).of(plain), *extras, whole=not as_json
+    )
     if advice_folder is not None and request.detail not in (None, "full"):
         raise InvalidInputError(
             f"--advice requires the full reply, got {request.detail!r}; remove detail",
@@ -139,33 +124,23 @@ def plan_command(
     return tables.ExitStatus.of(answer.reply.status)
 
 
-@click.command("demo")
-@click.option(
-    "-o",
-    "--output",
-    "picture",
-    type=options.OutputFile(*options.PICTURE_ENDINGS),
-    metavar="FILE",
-    help="Where the picture goes; crux-demo.png by default.",
-)
-@click.option(
-    "--climb",
-    "folder",
-    is_flag=False,
-    flag_value="crux-climb",
-    type=click.Path(path_type=Path, file_okay=False),
-    metavar="[DIR]",
-    help="Search for a climb on the bundled knob-wall instead; where its files go.",
-)
-@options.page_option
-@options.own_options
-@options.json_option
+@command("demo")
 def demo_command(
-    picture: Path | None,
-    folder: Path | None,
-    page: Path | None,
-    own: options.Own,
-    as_json: bool,
+    picture: Path | None = option(
+        "Where the picture goes; crux-demo.png by default.",
+        options.OutputFile(*options.PICTURE_ENDINGS),
+        usage="-o --output FILE",
+    ),
+    folder: Path | None = option(
+        "Search for a climb on the bundled knob-wall instead; where its files go.",
+        options.FOLDER_PATH,
+        usage="--climb [DIR]",
+        is_flag=False,
+        flag_value="crux-climb",
+    ),
+    page: Path | None = options.page_option,
+    own: options.Own = options.own_options,
+    as_json: bool = options.json_option,
 ) -> int:
     """Start the service, ask it for a plan of a real stance, and draw the answer.
 
@@ -210,20 +185,22 @@ def demo_command(
     return status
 
 
-@click.command("schema")
-@options.json_option
-def schema_command(as_json: bool) -> None:
+@command("schema")
+def schema_command(
+    as_json: bool = options.json_option,
+) -> None:
     """Print the JSON Schema of every message."""
     text = msgspec.json.encode(wire.schema())
     click.echo(text if as_json else msgspec.json.format(text))
 
 
-@click.command("redundancy")
-@options.stance_argument
-@options.plot_option("Draw it there.")
-@options.own_options
-@options.json_option
-def redundancy_command(stance: str, picture: Path | None, own: options.Own, as_json: bool) -> int:
+@command("redundancy")
+def redundancy_command(
+    stance: str = options.stance_argument,
+    picture: Path | None = options.plot_option("Draw it there."),
+    own: options.Own = options.own_options,
+    as_json: bool = options.json_option,
+) -> int:
     """Plan without each tile, finger and hand, one at a time, without moving.
 
     A tile that slips drags on while it is pressed. A finger that is lost is off the rock, with a
@@ -342,17 +319,15 @@ def _in_time(
         return None
 
 
-@click.command("new")
-@click.argument("kind", type=click.Choice(["stance", "route", "robot", "hand"]))
-@click.option(
-    "-o",
-    "--output",
-    "file",
-    type=options.OutputFile(".toml"),
-    metavar="FILE",
-    help="File to write, .toml, which must not exist; a robot's URDF is written beside it.",
-)
-def new_command(kind: str, file: Path | None) -> int:
+@command("new")
+def new_command(
+    kind: str = argument(click.Choice(["stance", "route", "robot", "hand"])),
+    file: Path | None = option(
+        "File to write, .toml, which must not exist; a robot's URDF is written beside it.",
+        options.OutputFile(".toml"),
+        usage="-o --output FILE",
+    ),
+) -> int:
     """Write a commented start of a stance, a route, a robot or a hand, as TOML that runs."""
     if kind == "robot":
         if file is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 from click.core import ParameterSource
@@ -13,10 +13,7 @@ from hand_models import parameters, scans
 from hand_models.base import Array, InvalidInputError, Pose
 from service import tables
 from service.commands import options
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
+from service.commands.declaring import argument, command, group, option
 
 __all__ = ["rock_command"]
 
@@ -36,102 +33,75 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     return numbers
 
 
-@click.command("rock", epilog=f"FILE ends in {', '.join(scans.SCAN_ENDINGS)}.")
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option(
-    "-o",
-    "--output",
-    "output",
-    type=options.OutputFile(".ply"),
-    required=True,
-    metavar="PLY",
-    help="Where the triangles go.",
-)
-@click.option(
-    "--unit",
-    type=click.Choice(list(scans.UNIT_METRES)),
-    default="m",
-    show_default=True,
-    help="Of the file's numbers.",
-)
-@click.option(
-    "--width",
-    type=float,
-    metavar="W",
-    help="In place of a unit: scale it so that its longest side is W [m].",
-)
-@click.option(
-    "--cell",
-    type=float,
-    help="Distance between neighbours of a grid, in the file's unit; by default the file's own.",
-)
-@click.option(
-    "--up",
-    type=click.Choice(list(scans.UP_ROTATIONS)),
-    default="z",
-    show_default=True,
-    help="The file's axis that points up; of a wall that was seen along z another is to be given.",
-)
-@click.option(
-    "--view",
-    callback=_triple,
-    metavar="X,Y,Z",
-    help="In which direction the scanner looked, in the file's axes; by default where the points "
-    "vary least, away from the viewpoint; down a grid's heights; into triangles.",
-)
-@click.option(
-    "--viewpoint",
-    callback=_triple,
-    metavar="X,Y,Z",
-    help="In place of a view: where the scanner was, in the file's axes and unit; by default what "
-    "a PCD file says, else the file's origin, unless that is too far away or too near.",
-)
-@click.option(
-    "--origin",
-    callback=_triple,
-    metavar="X,Y,Z",
-    help="Where the hold's frame begins, in the file's axes and unit; by default in the middle.",
-)
-@click.option(
-    "--spacing",
-    type=float,
-    help="Keep one point a square of that side across the view [m]; by default half the points' "
-    f"median distance, or as much more as leaves {SCAN_NUMBERS.scalar('mesh', 'vertices'):,.0f}, "
-    f"up to {SCAN_NUMBERS.scalar('mesh', 'spacing'):g}, or if that is not enough, as leaves "
-    f"{SCAN_NUMBERS.scalar('mesh', 'most'):,.0f}.",
-)
-@click.option(
-    "--hole",
-    type=float,
-    default=SCAN_NUMBERS.scalar("mesh", "hole"),
-    show_default=True,
-    help="The widest hole, and the highest step, that is bridged [m].",
-)
-@click.option(
-    "--std-ratio",
-    type=float,
-    metavar="R",
-    help="Drop stray points (statistical outlier removal): those whose mean distance to their "
-    "neighbours is above the mean by more than R standard deviations; 1 to 3 are usual.",
-)
-@click.option(
-    "--neighbours",
-    type=int,
-    help="Whose mean distance that is; by default "
-    f"{SCAN_NUMBERS.scalar('outliers', 'neighbours'):g}.",
-)
-@options.plot_option("Draw the rock there, as the scanner saw it.")
-@options.json_option
+def _point_option(words: str) -> Any:
+    """Return an option whose value is three numbers."""
+    return option(words, callback=_triple, usage="X,Y,Z")
+
+
+@command("rock", epilog=f"FILE ends in {', '.join(scans.SCAN_ENDINGS)}.")
 def rock_command(
-    file: Path,
-    output: Path,
-    spacing: float | None,
-    hole: float,
-    std_ratio: float | None,
-    neighbours: int | None,
-    picture: Path | None,
-    as_json: bool,
-    **reading: Any,
+    file: Path = argument(options.ANY_PATH),
+    output: Path = option(
+        "Where the triangles go.",
+        options.OutputFile(".ply"),
+        usage="-o --output PLY",
+        required=True,
+    ),
+    reading: dict[str, Any] = group(
+        dict,
+        unit=option("Of the file's numbers.", click.Choice(list(scans.UNIT_METRES)), default="m"),
+        width=option(
+            "In place of a unit: scale it so that its longest side is W [m].", float, usage="W"
+        ),
+        cell=option(
+            "Distance between neighbours of a grid, in the file's unit; by default the file's own.",
+            float,
+        ),
+        up=option(
+            "The file's axis that points up; of a wall that was seen along z another is to be "
+            "given.",
+            click.Choice(list(scans.UP_ROTATIONS)),
+            default="z",
+        ),
+        view=_point_option(
+            "In which direction the scanner looked, in the file's axes; by default where the "
+            "points vary least, away from the viewpoint; down a grid's heights; into triangles."
+        ),
+        viewpoint=_point_option(
+            "In place of a view: where the scanner was, in the file's axes and unit; by default "
+            "what a PCD file says, else the file's origin, unless that is too far away or too "
+            "near."
+        ),
+        origin=_point_option(
+            "Where the hold's frame begins, in the file's axes and unit; by default in the middle."
+        ),
+    ),
+    spacing: float | None = option(
+        "Keep one point a square of that side across the view [m]; by default half the points' "
+        "median distance, or as much more as leaves "
+        f"{SCAN_NUMBERS.scalar('mesh', 'vertices'):,.0f}, up to "
+        f"{SCAN_NUMBERS.scalar('mesh', 'spacing'):g}, or if that is not enough, as leaves "
+        f"{SCAN_NUMBERS.scalar('mesh', 'most'):,.0f}.",
+        float,
+    ),
+    hole: float = option(
+        "The widest hole, and the highest step, that is bridged [m].",
+        float,
+        default=SCAN_NUMBERS.scalar("mesh", "hole"),
+    ),
+    std_ratio: float | None = option(
+        "Drop stray points (statistical outlier removal): those whose mean distance to their "
+        "neighbours is above the mean by more than R standard deviations; 1 to 3 are usual.",
+        float,
+        usage="R",
+    ),
+    neighbours: int | None = option(
+        "Whose mean distance that is; by default "
+        f"{SCAN_NUMBERS.scalar('outliers', 'neighbours'):g}.",
+        int,
+    ),
+    picture: Path | None = options.plot_option("Draw the rock there, as the scanner saw it."),
+    as_json: bool = options.json_option,
 ) -> None:
     """Make a mesh hold of a scan: points, a grid of heights, or triangles.
 
@@ -173,7 +143,12 @@ def rock_command(
             f"with {reading['up']} up this is ground, or a roof; of a wall that was seen along "
             f"{reading['up']}, tell with --up which axis points up",
         )
-    _print_rock(scan, made, hole, reading["up"], assumed, output, tables.console(), warnings)
+    out = tables.console()
+    rows = _rows(scan, made, hole, reading["up"], assumed)
+    tables.print_rows(rows, tables.in_order([""], [""], [""]), out, heads=False)
+    out.print(f"pose {_pose(made.pose)}", soft_wrap=True)
+    tables.print_warnings(warnings, out)
+    out.print(str(output), soft_wrap=True)
 
 
 def _assumed(scan: scans.Scan) -> bool:
@@ -323,17 +298,10 @@ def _why_large(made: scans.ScannedRock) -> str:
     return scans.too_large(size)
 
 
-def _print_rock(
-    scan: scans.Scan,
-    made: scans.ScannedRock,
-    hole: float,
-    up: str,
-    assumed: bool,
-    output: Path,
-    out: Console,
-    warnings: list[str],
-) -> None:
-    """Print how many points and triangles there are, how large the rock is, and what is open."""
+def _rows(
+    scan: scans.Scan, made: scans.ScannedRock, hole: float, up: str, assumed: bool
+) -> list[tuple[str, str, str]]:
+    """Return how many points and triangles there are, how large the rock is, and what is open."""
     view = ", ".join(f"{size:z.2f}" for size in made.pose.rotation[:, 2])
     whence = "z up"
     if _assumed(scan):
@@ -357,12 +325,7 @@ def _print_rock(
     ]
     absent = {"outliers": not made.outliers, "alone": not made.alone}
     absent["passed over"] = made.kept or not beside
-    rows = [row for row in rows if not absent.get(row[0])]
-    if tables.verbosity() >= 0:
-        tables.print_rows(rows, tables.in_order([""], [""], [""]), out, heads=False)
-    out.print(f"pose {_pose(made.pose)}", soft_wrap=True)
-    tables.print_warnings(warnings, out)
-    out.print(str(output), soft_wrap=True)
+    return [row for row in rows if not absent.get(row[0])]
 
 
 def _sizes(what: str, sizes: list[float], hole: float) -> tuple[str, str]:

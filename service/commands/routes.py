@@ -15,6 +15,7 @@ import planner
 from hand_models.base import InvalidInputError, UnsupportedError, to_install
 from service import answering, bulk, climbs, requests, tables, wire
 from service.commands import batch, options, stances
+from service.commands.declaring import argument, command, flag, group, option
 
 if TYPE_CHECKING:
     from hand_models.base import Array
@@ -22,45 +23,34 @@ if TYPE_CHECKING:
 __all__ = ["climb_command", "route_command", "search_climb"]
 
 
-@click.command("route")
-@options.routes_argument
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Where tables, stances, pictures and the trajectory of one route go; or of any number of "
-    f"routes a file that ends in {batch.LISTED_ENDINGS}: the replies, one a line, or a table; with "
-    "--stage a file that ends in .json: the stance.",
-)
-@click.option(
-    "--stage",
-    "index",
-    type=click.IntRange(min=0),
-    metavar="K",
-    help="Print the plan of one stage of a route, from zero, as crux plan does.",
-)
-@click.option(
-    "--resume",
-    is_flag=True,
-    help="Go on where many routes were broken off: what the file answers is not asked again.",
-)
-@options.page_option
-@options.workers_options
-@options.spread_option
-@options.wanted_options
-@options.own_options
-@options.json_option
+@command("route")
 def route_command(
-    routes: tuple[str, ...],
-    output: Path | None,
-    page: Path | None,
-    index: int | None,
-    resume: bool,
-    parallel: options.WorkersOption,
-    wanted: options.Wanted,
-    own: options.Own,
-    as_json: bool,
+    routes: tuple[str, ...] = options.routes_argument,
+    output: Path | None = option(
+        "Where tables, stances, pictures and the trajectory of one route go; or of any number of "
+        f"routes a file that ends in {batch.LISTED_ENDINGS}: the replies, one a line, or a table; "
+        "with --stage a file that ends in .json: the stance.",
+        options.ANY_PATH,
+        usage="-o --output DIR",
+    ),
+    index: int | None = option(
+        "Print the plan of one stage of a route, from zero, as crux plan does.",
+        click.IntRange(min=0),
+        usage="--stage K",
+    ),
+    resume: bool = flag(
+        "Go on where many routes were broken off: what the file answers is not asked again."
+    ),
+    page: Path | None = options.page_option,
+    parallel: options.WorkersOption = options.workers_options,
+    wanted: options.Wanted = group(
+        options.Wanted,
+        spread=options.spread_option,
+        draws=options.draws_option,
+        unexplained=options.explain_option,
+    ),
+    own: options.Own = options.own_options,
+    as_json: bool = options.json_option,
 ) -> int:
     """Plan climbs: every stage, and every move between two stages.
 
@@ -71,7 +61,7 @@ def route_command(
     The exit status of many routes is the worst that one of them has, as for crux batch.
     """
     if index is not None:
-        return _stage(_Asked.of(routes, wanted, own), index, output, page, own, as_json)
+        return _stage(_Asked.of(routes, wanted, own), index, output, page, as_json)
     if output is None and page is None:
         lack = "missing: give -o DIR, --html FILE, or --stage K of one route"
         raise InvalidInputError(lack, field="-o")
@@ -81,10 +71,10 @@ def route_command(
         raise InvalidInputError("is for one route, planned at once", field="--html")
     if output is not None and batch.is_listed(output, listing, several, resume):
         one = {"--spread": wanted.spread, "--draws": wanted.draws, "--html": page}
-        for option, asked_for in one.items():
+        for field, asked_for in one.items():
             if asked_for:
                 raise InvalidInputError(
-                    f"is for one route, whose output -o is a folder, got {output}", field=option
+                    f"is for one route, whose output -o is a folder, got {output}", field=field
                 )
         names = [name for source in routes for name in stances.routes_of(source)]
         sources = climbs.Sources(names, lambda name: own.asked(stances.read_route(name)))
@@ -93,86 +83,72 @@ def route_command(
     if parallel.dask is not None:
         said = f"requires -o FILE that ends in {batch.LISTED_ENDINGS}"
         raise InvalidInputError(said, field="--dask")
-    return _one(_Asked.of(routes, wanted, own), output, page, parallel.workers, own, as_json)
+    return _one(_Asked.of(routes, wanted, own), output, page, parallel.workers, as_json)
 
 
-def _above(name: str, text: str, most: float = 1e3, **more: Any) -> Any:
+def _above(words: str, most: float = 1e3, **more: Any) -> Any:
     """Return an option whose value is a number above zero."""
-    return click.option(name, type=options.FiniteRange(0.0, most, min_open=True), help=text, **more)
+    return option(words, options.FiniteRange(0.0, most, min_open=True), **more)
 
 
 END_FORMS: Final = "x,y,z in W, height:Z, or a stance"
-WRIST_HELP: Final = "compliant: plan the stages of the climb with wrists that give, too."
-TRAVEL_HELP: Final = "Of compliant wrists: either way, toward the rock, turn [m, m, rad]."
-REFINE_HELP: Final = "That the weakest stage gets more places and poses, and all is searched again."
 
-sought_options = options.asked_for(
+sought_options = group(
     climbs.Sought,
-    "sought",
-    click.option("--from", "start", required=True, metavar="END", help=f"Start: {END_FORMS}."),
-    click.option("--to", "goal", required=True, metavar="END", help=f"Goal: {END_FORMS}."),
-    _above("--radius", "Of the body's origin about x,y,z [m]; 0.3 by default."),
-    click.option(
-        "--best-within",
-        default="5%",
-        show_default=True,
-        metavar="PART",
-        help="By which another climb may be better.",
+    start=option(f"Start: {END_FORMS}.", usage="--from END", required=True),
+    goal=option(f"Goal: {END_FORMS}.", usage="--to END", required=True),
+    radius=_above("Of the body's origin about x,y,z [m]; 0.3 by default."),
+    best_within=option("By which another climb may be better.", default="5%", usage="PART"),
+    at_least=_above("Load factor that is enough in all stages."),
+    time=_above("Of the search, after which the best climb so far is taken [s].", 1e6),
+    refine=option(
+        "That the weakest stage gets more places and poses, and all is searched again.",
+        click.IntRange(0, 16),
+        default=0,
+        show_default=False,
     ),
-    _above("--at-least", "Load factor that is enough in all stages."),
-    _above("--time", "Of the search, after which the best climb so far is taken [s].", most=1e6),
-    click.option("--refine", type=click.IntRange(0, 16), default=0, help=REFINE_HELP),
-    click.option("--surface", default="rock", show_default=True, help="A preset's name."),
-    _above("--spacing", "Of the points at which hands are tried [m].", most=10.0),
-    _above("--body-spacing", "Of the places of the body [m].", most=10.0),
-    _above("--stand-off", "Of the body from the rock [m]; repeatable.", most=10.0, multiple=True),
-    click.option(
-        "--lean",
-        type=options.FiniteRange(-1.57, 1.57),
+    surface=option("A preset's name.", default="rock"),
+    spacing=_above("Of the points at which hands are tried [m].", 10.0),
+    body_spacing=_above("Of the places of the body [m].", 10.0),
+    stand_off=_above("Of the body from the rock [m]; repeatable.", 10.0, multiple=True),
+    lean=option(
+        "Of a mesh's x from the vertical, away from the climber [rad].",
+        options.FiniteRange(-1.57, 1.57),
         default=0.0,
-        show_default=True,
-        help="Of a mesh's x from the vertical, away from the climber [rad].",
     ),
-    click.option("--wrist", type=click.Choice(["fixed", "compliant"]), help=WRIST_HELP),
-    click.option("--wrist-travel", type=(float, float, float), help=TRAVEL_HELP),
+    wrist=option(
+        "compliant: plan the stages of the climb with wrists that give, too.",
+        click.Choice(["fixed", "compliant"]),
+    ),
+    wrist_travel=option(
+        "Of compliant wrists: either way, toward the rock, turn [m, m, rad].",
+        (float, float, float),
+    ),
 )
 
 
-@click.command("climb")
-@click.argument("rocks", nargs=-1, required=True, metavar="ROCK...")
-@sought_options
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Where route, trajectory, stances, pictures, tables and the proof of one rock go; or of "
-    f"any number of rocks a file that ends in {batch.LISTED_ENDINGS}: the replies, one a line, or "
-    "a table.",
-)
-@click.option(
-    "--resume",
-    is_flag=True,
-    help="Go on where many rocks were broken off: what the file answers is not asked again.",
-)
-@options.page_option
-@options.workers_options
-@options.spread_option
-@options.draws_option
-@options.own_options
-@options.json_option
+@command("climb")
 def climb_command(
-    rocks: tuple[str, ...],
-    sought: climbs.Sought,
-    output: Path,
-    page: Path | None,
-    resume: bool,
-    parallel: options.WorkersOption,
-    spread: bool,
-    draws: list[requests.Draw] | None,
-    own: options.Own,
-    as_json: bool,
+    rocks: tuple[str, ...] = argument(nargs=-1, required=True, metavar="ROCK..."),
+    sought: climbs.Sought = sought_options,
+    output: Path = option(
+        "Where route, trajectory, stances, pictures, tables and the proof of one rock go; or of "
+        f"any number of rocks a file that ends in {batch.LISTED_ENDINGS}: the replies, one a line, "
+        "or a table.",
+        options.ANY_PATH,
+        usage="-o --output DIR",
+        required=True,
+    ),
+    resume: bool = flag(
+        "Go on where many rocks were broken off: what the file answers is not asked again."
+    ),
+    page: Path | None = options.page_option,
+    parallel: options.WorkersOption = options.workers_options,
+    wanted: options.Wanted = group(
+        options.Wanted, spread=options.spread_option, draws=options.draws_option
+    ),
+    own: options.Own = options.own_options,
+    as_json: bool = options.json_option,
 ) -> int:
     """Search for the best climb on each ROCK, with proof how much better any other can be.
 
@@ -185,10 +161,10 @@ def climb_command(
     """
     listing = climbs.climb_listing()
     listed = batch.is_listed(output, listing, len(rocks) > 1, resume)
-    for option, asked_for in {"--html": page, "--spread": spread, "--draws": draws}.items():
+    one = {"--html": page, "--spread": wanted.spread, "--draws": wanted.draws}
+    for field, asked_for in one.items():
         if listed and asked_for:
-            raise InvalidInputError("is for one rock, whose output -o is a folder", field=option)
-    wanted = options.Wanted(spread, draws)
+            raise InvalidInputError("is for one rock, whose output -o is a folder", field=field)
     with climbs.naming_options():
         asking = sought.asking(stances.read_request)
     sources = climbs.Sources(rocks, lambda rock: own.asked(asking(Path(rock))))
@@ -242,10 +218,11 @@ def search_climb(
 
 
 class _Asked(NamedTuple):
-    """A route request with its meshes, and as its file has it, which names mesh files."""
+    """A route request with its meshes, as its file has it with names of meshes, and whose it is."""
 
     request: requests.RouteRequest
     given: stances.Given[requests.RouteRequest]
+    own: options.Own
 
     @classmethod
     def of(cls, routes: Sequence[str], wanted: options.Wanted, own: options.Own) -> _Asked:
@@ -253,7 +230,7 @@ class _Asked(NamedTuple):
         if len(routes) > 1:
             raise InvalidInputError("is for one route", field="--stage")
         request, given = stances.read_route_with_text(routes[0])
-        return cls(wanted.of(own.asked(request)), given)
+        return cls(wanted.of(own.asked(request)), given, own)
 
     def stage(
         self,
@@ -270,15 +247,10 @@ class _Asked(NamedTuple):
 
 
 def _one(
-    asked: _Asked,
-    folder: Path | None,
-    page: Path | None,
-    workers: int | None,
-    own: options.Own,
-    as_json: bool,
+    asked: _Asked, folder: Path | None, page: Path | None, workers: int | None, as_json: bool
 ) -> int:
     """Evaluate one route, and write its report, its page or both."""
-    route = answering.route_of(asked.request, own.robots)
+    route = answering.route_of(asked.request, asked.own.robots)
     if folder is not None:
         tables.fill_alone(folder)
     with tables.progress(f"planning the moves of {route.name}") as report:
@@ -303,9 +275,7 @@ def _one(
         tables.print_route(result, files, tables.console(), climb)
         if "trajectory" in files and "trajectory table" not in files:
             tables.remark(f"for the trajectory as a table: {to_install('parquet')}")
-    status = tables.ExitStatus.of(result.status)
-    fails = climb is not None and climb.fails
-    return tables.ExitStatus.OVERLOADED if fails and status == tables.ExitStatus.DONE else status
+    return tables.ExitStatus.of(result.status, fails=climb is not None and climb.fails)
 
 
 def _climb(
@@ -324,18 +294,11 @@ def _say_lacking(error: UnsupportedError | None) -> None:
         tables.remark(f"no trajectory: {error}")
 
 
-def _stage(
-    asked: _Asked,
-    index: int,
-    file: Path | None,
-    page: Path | None,
-    own: options.Own,
-    as_json: bool,
-) -> int:
+def _stage(asked: _Asked, index: int, file: Path | None, page: Path | None, as_json: bool) -> int:
     """Print the plan of one stage, and write its stance and its page."""
     if file is not None and file.suffix.lower() != ".json":
         raise InvalidInputError(f"{file}: must end in .json with --stage", field="-o")
-    route = answering.route_of(asked.request, own.robots)
+    route = answering.route_of(asked.request, asked.own.robots)
     known = tuple(planner.stages(route))
     if index >= len(known):
         said = f"must be below {len(known)}, the number of stages, got {index}"
@@ -346,7 +309,7 @@ def _stage(
         climb, lacks = _climb(route)
     joints = None if climb is None else climb.stage_joints.get(index)
     request = options.with_extras(asked.stage(stage, joints), whole=not as_json)
-    answer = answering.planned(request, own.robots)
+    answer = answering.planned(request, asked.own.robots)
     _say_lacking(lacks)
     if file is not None:
         with tables.writing(file):

@@ -13,6 +13,7 @@ import planner
 from hand_models.base import InvalidInputError
 from service import answering, climbs, replies, requests, tables
 from service.commands import options, stances
+from service.commands.declaring import argument, command, flag, option
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
@@ -20,34 +21,20 @@ if TYPE_CHECKING:
 __all__ = ["body_space_command", "screen_command", "wrench_space_command"]
 
 
-@click.command("wrench-space")
-@options.stance_argument
-@options.limb_option
-@options.plot_option("Draw it there.")
-@click.option(
-    "--search",
-    "per_axis",
-    type=click.IntRange(3, 25),
-    metavar="N",
-    help="Of a floating hand: search N^6 poses of its wrist, too.",
-)
-@click.option(
-    "--robust", is_flag=True, help="And the least of it where the hand is a little elsewhere."
-)
-@click.option(
-    "--opening", is_flag=True, help="And how the hand lets go of its hold; --plot draws this."
-)
-@options.robot_option
-@options.json_option
+@command("wrench-space")
 def wrench_space_command(
-    stance: str,
-    limb_and_hand: tuple[str, ParameterTable | None],
-    picture: Path | None,
-    per_axis: int | None,
-    robust: bool,
-    opening: bool,
-    robot: planner.RobotFile | None,
-    as_json: bool,
+    stance: str = options.stance_argument,
+    limb_and_hand: tuple[str, ParameterTable | None] = options.limb_option,
+    picture: Path | None = options.plot_option("Draw it there."),
+    per_axis: int | None = option(
+        "Of a floating hand: search N^6 poses of its wrist, too.",
+        click.IntRange(3, 25),
+        usage="--search N",
+    ),
+    robust: bool = flag("And the least of it where the hand is a little elsewhere."),
+    opening: bool = flag("And how the hand lets go of its hold; --plot draws this."),
+    robot: planner.RobotFile | None = options.robot_option,
+    as_json: bool = options.json_option,
 ) -> int:
     """Show what one hand can carry."""
     limb, hand = limb_and_hand
@@ -67,38 +54,34 @@ def wrench_space_command(
         wrist = planner.floating_wrist(answering.stance(request.stance, robots), limb)
         with tables.progress(f"{per_axis}^6 poses of {limb}") as report:
             found = planner.survey(wrist, per_axis, report)
-    if picture is not None and opening:
-        from hand_models.opening import opening_path
-
-        settled, _ = planner.hand_space(answering.stance(request.stance, robots), limb)
-        with tables.writing(picture):
-            planner.plot_opening(opening_path(settled), picture, f"{limb} of {stance}")
-    elif picture is not None:
-        drawn = answering.stance(request.stance, robots)
+    if picture is not None:
+        drawn, title = answering.stance(request.stance, robots), f"{limb} of {stance}"
         settled, space = planner.hand_space(drawn, limb)
         shown, preload = space if reply.capability else None, None
         if reply.wrist.mode == "floating":
             preload = planner.floating_wrist(drawn, limb).hand.preload
+        outlined = reply.vertices is None
         with tables.writing(picture):
-            planner.plot_wrench_space(
-                settled,
-                shown,
-                picture,
-                f"{limb} of {stance}",
-                preload,
-                outlined=reply.vertices is None,
-            )
+            if opening:
+                from hand_models.opening import opening_path
+
+                planner.plot_opening(opening_path(settled), picture, title)
+            else:
+                planner.plot_wrench_space(
+                    settled, shown, picture, title, preload, outlined=outlined
+                )
     if as_json:
         searched = {} if found is None else {"search": tables.survey_json(found)}
         tables.say(msgspec.to_builtins(reply) | searched)
     else:
-        tables.print_wrench_space(reply, tables.console())
+        out = tables.console()
+        tables.print_wrench_space(reply, out)
         if isinstance(reply.robust, replies.RobustCapability) and reply.capability:
-            tables.print_robust(reply.robust, tables.console())
+            tables.print_robust(reply.robust, out)
         if isinstance(reply.opening, replies.OpeningReply):
-            tables.print_opening(reply.opening, tables.console())
+            tables.print_opening(reply.opening, out)
         if found is not None:
-            tables.print_survey(found, tables.console())
+            tables.print_survey(found, out)
     return tables.ExitStatus.DONE if reply.capability else tables.ExitStatus.OVERLOADED
 
 
@@ -125,42 +108,28 @@ def _shaken(load: planner.Load | None, shake: float | None) -> list[tuple[float,
     ]
 
 
-@click.command("body-space")
-@options.stance_argument
-@click.option(
-    "--axes",
-    default="fx,fz",
-    show_default=True,
-    callback=_check_axes,
-    metavar="AXIS,AXIS",
-    help="Of the plane of body wrenches that is shown: fx, fy, fz, mx, my or mz, in B.",
-)
-@click.option(
-    "--projection",
-    is_flag=True,
-    help="Whatever the other components; as asked for by default.",
-)
-@click.option("--pure", is_flag=True, help="With the other components zero.")
-@click.option("--com", is_flag=True, help="Show instead where the centre of mass may be.")
-@click.option(
-    "--shake",
-    type=options.FiniteRange(0.0, 1e2, min_open=True),
-    metavar="A",
-    help="With --com, in three dimensions: under accelerations of A m/s² along ± each axis of W.",
-)
-@options.plot_option("Draw it there, and the largest accelerations in two planes.")
-@options.own_options
-@options.json_option
+@command("body-space")
 def body_space_command(
-    stance: str,
-    axes: list[requests.Axis],
-    projection: bool,
-    pure: bool,
-    com: bool,
-    shake: float | None,
-    picture: Path | None,
-    own: options.Own,
-    as_json: bool,
+    stance: str = options.stance_argument,
+    axes: list[requests.Axis] = option(
+        "Of the plane of body wrenches that is shown: fx, fy, fz, mx, my or mz, in B.",
+        default="fx,fz",
+        callback=_check_axes,
+        usage="AXIS,AXIS",
+    ),
+    projection: bool = flag("Whatever the other components; as asked for by default."),
+    pure: bool = flag("With the other components zero."),
+    com: bool = flag("Show instead where the centre of mass may be."),
+    shake: float | None = option(
+        "With --com, in three dimensions: under accelerations of A m/s² along ± each axis of W.",
+        options.FiniteRange(0.0, 1e2, min_open=True),
+        usage="A",
+    ),
+    picture: Path | None = options.plot_option(
+        "Draw it there, and the largest accelerations in two planes."
+    ),
+    own: options.Own = options.own_options,
+    as_json: bool = options.json_option,
 ) -> int:
     """Show what the body can bear: which wrenches, and which accelerations.
 
@@ -207,29 +176,27 @@ def body_space_command(
     else:
         tables.print_body_space(found.reply, tables.console(), accelerations)
     falls = accelerations > 0 and (found.solid is None or found.solid.margin < 0.0)
-    status = tables.ExitStatus.of(found.reply.status)
-    return tables.ExitStatus.OVERLOADED if falls and status == tables.ExitStatus.DONE else status
+    return tables.ExitStatus.of(found.reply.status, fails=falls)
 
 
-@click.command("screen")
-@click.argument("candidates")
-@click.option(
-    "--best",
-    type=click.IntRange(min=1),
-    default=1,
-    show_default=True,
-    metavar="N",
-    help="Plan the best N, and prove that no other is better.",
-)
-@click.option(
-    "--within",
-    default="0",
-    metavar="PART",
-    help="Plan also all whose load factor may be within this part of the best, as 5% or 0.05.",
-)
-@options.own_options
-@options.json_option
-def screen_command(candidates: str, best: int, within: str, own: options.Own, as_json: bool) -> int:
+@command("screen")
+def screen_command(
+    candidates: str = argument(),
+    best: int = option(
+        "Plan the best N, and prove that no other is better.",
+        click.IntRange(min=1),
+        default=1,
+        usage="N",
+    ),
+    within: str = option(
+        "Plan also all whose load factor may be within this part of the best, as 5% or 0.05.",
+        default="0",
+        usage="PART",
+        show_default=False,
+    ),
+    own: options.Own = options.own_options,
+    as_json: bool = options.json_option,
+) -> int:
     """Rank stances by their load factors; solve only those that may be the best.
 
     CANDIDATES is the path of a file of JSON lines as crux batch takes it, - for standard input, or

@@ -1,4 +1,4 @@
-"""Define ``crux study`` and ``crux check``: claims of the paper, and of a climb, recomputed."""
+"""Define ``crux study``, ``check`` and ``replay``: claims and answers, computed again."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import click
-
 import planner
 from hand_models.base import InvalidInputError
-from service import answering, tables
+from service import answering, operating, recording, tables
 from service.commands import options, stances
+from service.commands.declaring import argument, command, group, option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
 
 
-__all__ = ["STUDY_NAMES", "SURFACE_NAMES", "check_command", "study_command"]
+__all__ = ["STUDY_NAMES", "SURFACE_NAMES", "check_command", "replay_command", "study_command"]
 
 STUDY_NAMES: Final = (
     "fig06",
@@ -84,42 +83,36 @@ def _measurements() -> studies.Study:
     return planner.MeasurementStudy(fixed)
 
 
-@click.command("study", epilog=f"NAME is one of {', '.join(STUDY_NAMES)}.")
-@click.argument("name", shell_complete=stances.beginning_so(STUDY_NAMES))
-@options.folder_option("Where result.json and the pictures go.")
-@click.option(
-    "--x",
-    metavar="SECTION.NAME[i]=LOW:HIGH:N",
-    help="Of a sweep: a number of the gripper's, [i] if it is one of a list, and N values "
-    "from LOW to HIGH in SI units, such as finger.pulley_radii[1]=0.001:0.005:21; by "
-    "default Fig. 16's.",
-)
-@click.option(
-    "--y",
-    metavar="SECTION.NAME[i]=LOW:HIGH:N",
-    help="Of a sweep: the other number, as --x; by default Fig. 16's.",
-)
-@click.option("--diameter", type=float, help="Of a sweep: of the rock [m]; by default Fig. 16's A.")
-@click.option(
-    "--tension", type=float, help="Of a sweep: of both tendons [N]; by default Fig. 16's."
-)
-@click.option(
-    "--surface",
-    metavar="NAME",
-    help=f"Of a sweep: {', '.join(SURFACE_NAMES)}; by default that of Fig. 16.",
-)
-@click.option(
-    "--measure",
-    "measures",
-    multiple=True,
-    metavar="NAME",
-    help="Of a sweep: shear, normal, moment or volume, again for more than one map; by "
-    "default shear and normal.",
-)
-@options.hand_option
-@options.json_option
+@command("study", epilog=f"NAME is one of {', '.join(STUDY_NAMES)}.")
 def study_command(
-    name: str, folder: Path, hand: ParameterTable | None, as_json: bool, **wanted: Any
+    name: str = argument(shell_complete=stances.beginning_so(STUDY_NAMES)),
+    folder: Path = options.folder_option("Where result.json and the pictures go."),
+    wanted: dict[str, Any] = group(
+        dict,
+        x=option(
+            "Of a sweep: a number of the gripper's, [i] if it is one of a list, and N values "
+            "from LOW to HIGH in SI units, such as finger.pulley_radii[1]=0.001:0.005:21; by "
+            "default Fig. 16's.",
+            usage="SECTION.NAME[i]=LOW:HIGH:N",
+        ),
+        y=option(
+            "Of a sweep: the other number, as --x; by default Fig. 16's.",
+            usage="SECTION.NAME[i]=LOW:HIGH:N",
+        ),
+        diameter=option("Of a sweep: of the rock [m]; by default Fig. 16's A.", float),
+        tension=option("Of a sweep: of both tendons [N]; by default Fig. 16's.", float),
+        surface=option(
+            f"Of a sweep: {', '.join(SURFACE_NAMES)}; by default that of Fig. 16.", usage="NAME"
+        ),
+        measures=option(
+            "Of a sweep: shear, normal, moment or volume, again for more than one map; by "
+            "default shear and normal.",
+            usage="--measure NAME",
+            multiple=True,
+        ),
+    ),
+    hand: ParameterTable | None = options.hand_option,
+    as_json: bool = options.json_option,
 ) -> None:
     """Run an experiment of the paper again, and compare its claims with the model.
 
@@ -185,10 +178,11 @@ def _shown(value: str | float) -> str:
     return value if isinstance(value, str) else f"{value:.4g}"
 
 
-@click.command("check")
-@click.argument("certificate", type=click.Path(path_type=Path))
-@options.json_option
-def check_command(certificate: Path, as_json: bool) -> int:
+@command("check")
+def check_command(
+    certificate: Path = argument(options.ANY_PATH),
+    as_json: bool = options.json_option,
+) -> int:
     """Recompute what the certificate of a climb claims, without the search.
 
     CERTIFICATE is the file that was written with the climb. The check recomputes the supports of
@@ -207,3 +201,31 @@ def check_command(certificate: Path, as_json: bool) -> int:
         tables.print_certificate(claimed, bound, route, tables.console())
     right = bound.proven and route.fault is None
     return tables.ExitStatus.DONE if right else tables.ExitStatus.OVERLOADED
+
+
+@command("replay")
+def replay_command(
+    file: Path = argument(options.ANY_PATH, metavar="FILE"),
+    own: options.Own = options.own_options,
+    as_json: bool = options.json_option,
+) -> int:
+    """Ask all questions of a recording again, here, and say what has moved in the answers.
+
+    FILE is one of crux serve --record. Answers are compared to the digit, without identifiers and
+    times on a clock. The exit status is 3 if an answer has moved. The hand is the recorded
+    service's unless --hand gives another; of a robot of your own, give --robot again.
+    """
+    recorded = recording.Recording(file)
+    replay = recording.Replay(recorded, own.robots, own.hand)
+    with tables.progress("replaying", line=f"replaying {file}") as step:
+        for _ in replay.run(recorded.questions(step)):
+            pass
+    operating.note_losses(recorded, file)
+    if as_json:
+        tables.say(operating.replay_json(replay))
+    else:
+        operating.print_replay(replay, tables.console())
+    if replay.moved:
+        return tables.ExitStatus.OVERLOADED
+    lost = recorded.damaged or (recorded.whole is False and not replay.asked)
+    return tables.ExitStatus.FAILED if lost else tables.ExitStatus.DONE

@@ -15,60 +15,42 @@ from hand_models.base import CruxError, InvalidInputError, errors_under
 from service import answering, processes, replies, requests, sweeping, tables
 from service.commands import options, stances
 from service.commands.batch import answer_rest, writing_answers
+from service.commands.declaring import argument, command, flag, group, option
 
 __all__ = ["simulate_command", "sweep_command"]
 
 
-@click.command("sweep")
-@options.stance_argument
-@click.option(
-    "--vary",
-    "variations",
-    multiple=True,
-    required=True,
-    metavar="PATH=VALUES",
-    help="A field of the request and its values: LOW:HIGH:COUNT, or a,b,c of numbers or words. "
-    "Once for each field.",
-)
-@click.option(
-    "--samples",
-    type=click.IntRange(min=1),
-    help="Points of a Latin hypercube over the ranges, in place of the grid of all values.",
-)
-@click.option("--seed", type=click.IntRange(min=0), help="Of the samples; by default 0.")
-@click.option(
-    "--over",
-    metavar="PATH,PATH",
-    help="Which two fields the picture is over, across and up, where more than two vary.",
-)
-@click.option(
-    "--tolerance",
-    type=options.FiniteRange(1e-9, 0.5),
-    default=sweeping.BORDER_TOLERANCE,
-    show_default=True,
-    help="Of where it stops holding, if one number varies: a share of the range.",
-)
-@click.option(
-    "--resume",
-    is_flag=True,
-    help="Go on where this sweep was broken off: points that the table of DIR has are kept.",
-)
-@options.workers_options
-@options.folder_option("Where the table and the picture go.")
-@options.own_options
-@options.json_option
+@command("sweep")
 def sweep_command(
-    stance: str,
-    variations: tuple[str, ...],
-    samples: int | None,
-    seed: int | None,
-    over: str | None,
-    tolerance: float,
-    resume: bool,
-    parallel: options.WorkersOption,
-    folder: Path,
-    own: options.Own,
-    as_json: bool,
+    stance: str = options.stance_argument,
+    variations: tuple[str, ...] = option(
+        "A field of the request and its values: LOW:HIGH:COUNT, or a,b,c of numbers or words. "
+        "Once for each field.",
+        usage="--vary PATH=VALUES",
+        multiple=True,
+        required=True,
+    ),
+    samples: int | None = option(
+        "Points of a Latin hypercube over the ranges, in place of the grid of all values.",
+        click.IntRange(min=1),
+    ),
+    seed: int | None = option("Of the samples; by default 0.", click.IntRange(min=0)),
+    over: str | None = option(
+        "Which two fields the picture is over, across and up, where more than two vary.",
+        usage="PATH,PATH",
+    ),
+    tolerance: float = option(
+        "Of where it stops holding, if one number varies: a share of the range.",
+        options.FiniteRange(1e-9, 0.5),
+        default=sweeping.BORDER_TOLERANCE,
+    ),
+    resume: bool = flag(
+        "Go on where this sweep was broken off: points that the table of DIR has are kept."
+    ),
+    parallel: options.WorkersOption = options.workers_options,
+    folder: Path = options.folder_option("Where the table and the picture go."),
+    own: options.Own = options.own_options,
+    as_json: bool = options.json_option,
 ) -> int:
     """Plan a stance over varied fields: a table, a picture, and where it stops holding.
 
@@ -141,48 +123,35 @@ def _status(result: sweeping.Sweep) -> int:
     return tables.ExitStatus.DONE
 
 
-@click.command("simulate")
-@click.argument(
-    "source",
-    metavar="STANCE|ROUTE",
-    shell_complete=stances.beginning_so(
-        stances.bundled() + stances.bundled(requests.RouteRequest), files=True
-    ),
-)
-@click.option("--draws", type=click.IntRange(1, 1_000_000), help="Draws of strengths.")
-@click.option(
-    "--replanned",
-    type=click.IntRange(0, 100_000),
-    help="Of these with new set-points after each slip.",
-)
-@click.option("--seed", type=click.IntRange(0, 2**31), help="Of the draws.")
-@click.option(
-    "--strength",
-    type=options.FiniteRange(0.01, 100.0),
-    help="True mean strength of tiles over the assumed one.",
-)
-@click.option(
-    "--delay",
-    type=options.FiniteRange(0.0, 10.0),
-    metavar="SECONDS",
-    help="From a slip to the new set-points.",
-)
-@options.plot_option(
-    "Draw a cascade, survival over the load, and predicted against simulated; of a route, survival "
-    "by stage."
-)
-@click.option(
-    "--workers", type=click.IntRange(min=1), help="Processes; by default one for each core."
-)
-@options.own_options
-@options.json_option
+@command("simulate")
 def simulate_command(
-    source: str,
-    picture: Path | None,
-    workers: int | None,
-    own: options.Own,
-    as_json: bool,
-    **chosen: Any,
+    source: str = argument(
+        metavar="STANCE|ROUTE",
+        shell_complete=stances.beginning_so(
+            stances.bundled() + stances.bundled(requests.RouteRequest), files=True
+        ),
+    ),
+    chosen: dict[str, Any] = group(
+        dict,
+        draws=option("Draws of strengths.", click.IntRange(1, 1_000_000)),
+        replanned=option(
+            "Of these with new set-points after each slip.", click.IntRange(0, 100_000)
+        ),
+        seed=option("Of the draws.", click.IntRange(0, 2**31)),
+        strength=option(
+            "True mean strength of tiles over the assumed one.", options.FiniteRange(0.01, 100.0)
+        ),
+        delay=option(
+            "From a slip to the new set-points.", options.FiniteRange(0.0, 10.0), usage="SECONDS"
+        ),
+    ),
+    picture: Path | None = options.plot_option(
+        "Draw a cascade, survival over the load, and predicted against simulated; of a route, "
+        "survival by stage."
+    ),
+    workers: int | None = option("Processes; by default one for each core.", click.IntRange(min=1)),
+    own: options.Own = options.own_options,
+    as_json: bool = options.json_option,
 ) -> int:
     """Let tiles slip at random: count how often all hands hold, with new set-points or without.
 
@@ -245,7 +214,16 @@ def _simulate_stance(
 ) -> int:
     """Simulate a stance in several processes, and show its survival."""
     count = planner.cores() if workers is None else workers
-    first = _with(request, settings)
+    first = msgspec.structs.replace(
+        request,
+        want=["survival"],
+        survival=settings,
+        draws=[],
+        open_loop=None,
+        detail=None,
+        max_reply_bytes=None,
+        explain=False,
+    )
     question, plan, reply = answering.planned(
         msgspec.structs.replace(first, want=[], survival=None), own.robots
     )[:3]
@@ -265,7 +243,11 @@ def _simulate_stance(
             processes.Planners(count, robot=own.robot) as planners,
             tables.progress(f"simulating {stance} at other loads") as progress,
         ):
-            asked = [_at_load(first, reply, load, fewer) for load in others]
+            wrenches = [[load * each for each in reply.body_wrench] for load in others]
+            asked = [
+                msgspec.structs.replace(first, body_wrench=each, load=None, survival=fewer)
+                for each in wrenches
+            ]
             answers = _replies(planners.plan_many(asked, progress))
         curve = [(1.0, found)] + [
             (load, each.survival)
@@ -282,33 +264,6 @@ def _simulate_stance(
         if found.tail is not None:
             tables.remark(found.tail)
     return tables.ExitStatus.of(reply.status)
-
-
-def _with(
-    request: requests.PlanRequest, settings: planner.SurvivalSettings
-) -> requests.PlanRequest:
-    """Return a request for the survival alone."""
-    return msgspec.structs.replace(
-        request,
-        want=["survival"],
-        survival=settings,
-        draws=[],
-        open_loop=None,
-        detail=None,
-        max_reply_bytes=None,
-        explain=False,
-    )
-
-
-def _at_load(
-    request: requests.PlanRequest,
-    reply: replies.PlanReply,
-    load: float,
-    settings: planner.SurvivalSettings,
-) -> requests.PlanRequest:
-    """Return the request for a multiple of its body wrench."""
-    wrench = [load * each for each in reply.body_wrench]
-    return msgspec.structs.replace(request, body_wrench=wrench, load=None, survival=settings)
 
 
 def _replies(answers: list[Any]) -> list[replies.PlanReply]:
