@@ -28,6 +28,8 @@ __all__ = [
     "Own",
     "Wanted",
     "WorkersOption",
+    "draws_option",
+    "explain_option",
     "folder_option",
     "hand_option",
     "json_option",
