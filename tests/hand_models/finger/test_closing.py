@@ -68,7 +68,7 @@ def test_spines_let_go_where_the_declared_law_of_their_tile_ends(exponent):
 # Everywhere ---------------------------------------------------------------------------------------
 
 
-@given_some(8, 1000, seeds)
+@given_some(8, 400, seeds)
 @example(235630260)
 def test_wherever_a_finger_closes_it_is_clear_of_rock_whole_and_in_balance(seed):
     on_hold = random_opening(MODEL, seed)
@@ -120,7 +120,7 @@ def test_on_rough_rock_fingers_close():
 @pytest.mark.slow
 @pytest.mark.parametrize("first", [10_000])
 def test_on_rough_rock_fingers_close_slow(first):
-    on_rough_rock(first, 150)
+    on_rough_rock(first, 60)
 
 
 def test_spines_are_pulled_off_where_their_drag_is_too_little_for_the_pull():
