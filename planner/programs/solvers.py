@@ -49,12 +49,12 @@ __all__ = [
 CAP_SLACK: Final = 1e-6
 """Utilisation by which the tie-break may exceed the least; also the tolerance at a cap."""
 
-_PLANS: Final = bundled_table("plans.toml", "planner.parameters")
+_PLAN_NUMBERS: Final = bundled_table("plans.toml", "planner.parameters")
 
-GIVEN_AWAY: Final = _PLANS.positive("tension", "given_away")
+GIVEN_AWAY: Final = _PLAN_NUMBERS.positive("tension", "given_away")
 """Part of the least utilisation that a plan may spend for less tension."""
 
-TENSION_WEIGHT: Final = _PLANS.positive("tension", "weight")
+TENSION_WEIGHT: Final = _PLAN_NUMBERS.positive("tension", "weight")
 """Weight w of the sum of squared relative tensions."""
 
 
