@@ -90,15 +90,10 @@ class Dispatcher:
         ------
         LostError
             If three workers in a row die before they are ready.
-        RuntimeError
-            If this process is itself being started, by a program that lacks its
-            ``if __name__ == "__main__":``.
         """
-        # of a program without its guard, the workers come here, too: the error ends them
-        self._pool.start_worker()
+        self._pool.start_worker()  # in this thread, so that the error of a missing guard ends it
         self._thread.start()
-        # now and then awake for signals, which may come in another thread
-        while not self._started.wait(timeout=0.1):
+        while not self._started.wait(timeout=0.1):  # awake for signals in other threads
             continue
         if not self._pool.up:
             self.stop()

@@ -95,6 +95,8 @@ class PlanService:
         be no node of ROS 2.
     LostError
         On entering, if no worker starts.
+    RuntimeError
+        On entering, in a worker of a program that lacks its ``if __name__ == "__main__":``.
     """
 
     def __init__(
