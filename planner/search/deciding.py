@@ -195,7 +195,8 @@ class Decision:
             if new:
                 _, met = self._lifts.expand(np.array(new), 0)
                 to = met[:, 1]
-                met = met[(to == -side) | ((to >= 0) & (self._nodes["closed"][to] == side))]
+                closed = self._nodes["closed"][np.maximum(to, 0)] == side
+                met = met[(to == -side) | ((to >= 0) & closed)]
                 order = np.argsort(met[:, 0], kind="stable")
                 met = met[order]
                 firsts = np.searchsorted(met[:, 0], [*new, len(self._nodes)])

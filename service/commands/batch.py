@@ -105,6 +105,11 @@ def batch_command(
             brief=is_table,
         )
         if export and isinstance(sink, bulk.TableLines):
+            if not before:
+                raise InvalidInputError(
+                    f"{sink.file} has no answers of these requests; answer some first",
+                    field="--export",
+                )
             with writing_answers(file):
                 sink.export()
         else:
@@ -305,13 +310,13 @@ def _print(tally: bulk.Tally, before: int, elapsed: float, file: Path | None) ->
         tables.number("median ms", "2", ".1f", scale=1e3),
         tables.number("longest ms", "3", ".1f", scale=1e3),
     )
-    tables.print_rows(rows, columns, out)
+    tables.print_rows(rows, columns, out, result=True)
     done = tally.count - before
     rate = done / elapsed if elapsed > 0.0 else 0.0
     known = f", {before} were answered before" if before else ""
-    out.print(f"{done} requests in {elapsed:.1f} s, {rate:.0f} a second{known}", markup=False)
+    out.print(f"{done} requests in {elapsed:.1f} s, {rate:.0f} a second{known}")
     if file is not None:
-        out.print(f"written: {file}", markup=False, soft_wrap=True)
+        out.print(f"written: {file}", soft_wrap=True)
 
 
 def is_listed(output: Path, listing: Listing, several: bool, resume: bool) -> bool:

@@ -108,7 +108,10 @@ def _verbosity(context: click.Context, option: click.Parameter, given: bool) -> 
 
 
 def _say_more_or_less(command: click.Command) -> click.Command:
-    """Add the options that every command has, before or after its name."""
+    """Add the options that every command has, before or after its name; to those of a group."""
+    if isinstance(command, click.Group):
+        for own in command.commands.values():
+            _say_more_or_less(own)
     command.params += [
         click.Option(
             ["-v", "--verbose"],

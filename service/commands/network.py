@@ -212,7 +212,7 @@ def _say_checked(found: dict[str, Any], as_json: bool) -> None:
         out = tables.console()
         for word, value in found.items():
             text = ", ".join(map(str, value)) if isinstance(value, list | tuple) else value
-            out.print(f"{word}: {'none' if text in (None, '') else text}", markup=False)
+            out.print(f"{word}: {'none' if text in (None, '') else text}")
 
 
 @command("query")
@@ -286,7 +286,7 @@ def top_command(
                 before, now = now, operating.read_snapshot(session, name, timeout)
 
 
-@click.group("keys")
+@click.group("keys", no_args_is_help=False)
 def keys_command() -> None:
     """Make certificates and rights: who may ask a service, and who may only watch it.
 

@@ -301,9 +301,19 @@ def _from_toml(text: bytes) -> dict[str, Any]:
         If the text is not TOML in UTF-8.
     """
     try:
-        return tomllib.loads(text.decode())
+        return _in_64_bits(tomllib.loads(text.decode()))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise wire.MalformedError(f"not valid TOML: {error or 'nested too deep'}") from None
+
+
+def _in_64_bits(content: Any) -> Any:
+    """Return a content in which whole numbers beyond 64 bits are floats, as msgspec reads them."""
+    if isinstance(content, dict):
+        return {name: _in_64_bits(each) for name, each in content.items()}
+    if isinstance(content, list):
+        return [_in_64_bits(each) for each in content]
+    large = isinstance(content, int) and not -(2**63) <= content < 2**64
+    return float(str(content)) if large else content
 
 
 def _folder(kind: type[requests.Request]) -> Traversable:
@@ -326,6 +336,8 @@ def _read(
                 path = folder / f"{source}.json"
                 whole, given = _decoded(path.read_bytes(), kind, path)
                 return whole, given._replace(files=None)
+    if path.is_dir():
+        raise InvalidInputError(f"is a folder: {path}; name a file in it", field=field)
     names = ", ".join(name for kind in kinds for name in bundled(kind))
     raise InvalidInputError(
         f"no such file, and no bundled {noun} {source!r}; bundled are {names}", field=field

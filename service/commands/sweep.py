@@ -105,11 +105,10 @@ def sweep_command(
         tables.say(result.summary() | {"files": {"table": str(table), "picture": str(picture)}})
     else:
         out = tables.console()
-        if tables.verbosity() >= 0:
-            tables.print_sweep(result, out)
-            if odd := sum(bool(row.warnings) for row in result.rows):
-                out.print(f"warnings: at {odd} of {len(result.rows)} points, in the table")
-        out.print(f"table: {table}\npicture: {picture}", markup=False, soft_wrap=True)
+        tables.print_sweep(result, out)
+        if odd := sum(bool(row.warnings) for row in result.rows):
+            out.print(f"warnings: at {odd} of {len(result.rows)} points, in the table")
+        out.print(f"table: {table}\npicture: {picture}", soft_wrap=True)
     return _status(result)
 
 

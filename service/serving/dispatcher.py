@@ -99,8 +99,8 @@ class Dispatcher:
             self.stop()
             self.close()
             raise LostError(
-                f"none of the {self._pool.workers} workers started; each one's last lines on "
-                "standard error of this process say why"
+                f"none of the {self._pool.workers} workers started: their last lines above say why"
+                "; a program that serves needs its 'if __name__ == \"__main__\":'"
             )
 
     def ask(self, query: AnyQuery, key: str) -> None:

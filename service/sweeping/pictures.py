@@ -279,10 +279,13 @@ def _maps(sweep: Sweep, *pair: int) -> Figure:
     groups = _rows_by(sweep, third, values)
     shown = [row for rows in groups for row in rows]
     x, y = (Side(sweep, place) for place in pair)
-    colours, extend = _colours(shown)
+    # of points with caps of their own, colours show parts of these
+    shade, of = ("margin", "over its cap ") if _common_cap(shown) is None else ("utilisation", "")
+    colours, extend = _colours(shown, shade)
     draw, drawn = _draw_samples if design.sampled else _draw_map, None
     for i, (axes, value, rows) in enumerate(zip(every, values, groups, strict=True)):
-        drawn = draw(axes, x, y, _columns(rows, x=x, y=y), colours) or drawn
+        columns_of = _columns(rows, x=x, y=y)
+        drawn = draw(axes, x, y, columns_of | {"shade": columns_of[shade]}, colours) or drawn
         x.label_axis(axes.xaxis)
         y.label_axis(axes.yaxis)
         axes.label_outer()
@@ -294,7 +297,7 @@ def _maps(sweep: Sweep, *pair: int) -> Figure:
             words = f"{target.path} = {word_of(value)} {target.unit or ''}"
             axes.set_title(words.strip(), fontsize=9)
     if drawn is not None:
-        figure.colorbar(drawn, ax=every, label="utilisation [1]", extend=extend)
+        figure.colorbar(drawn, ax=every, label=f"utilisation {of}[1]", extend=extend)
     _legend(figure, _markers(shown) if design.sampled else _map_handles(shown))
     if others[1:]:
         names = ", ".join(design.targets[i].path for i in others[1:])
@@ -302,12 +305,12 @@ def _maps(sweep: Sweep, *pair: int) -> Figure:
     return figure
 
 
-def _colours(rows: Sequence[SweepRow]) -> tuple[dict[str, Any], str]:
-    """Return the scale of utilisations, the cap in its middle, and whether some are beyond it.
+def _colours(rows: Sequence[SweepRow], shade: str) -> tuple[dict[str, Any], str]:
+    """Return the scale of a number, the cap in its middle, and whether some are beyond it.
 
     It is blue where it holds, white at the cap, and red beyond.
     """
-    used = [row.utilisation for row in rows if row.utilisation is not None]
+    used = [used for row in rows if (used := getattr(row, shade)) is not None]
     cap = _common_cap(rows) or 1.0
     low, high = min(used, default=0.0), max(used, default=cap)
     # at least from 0.5 to 1.5 caps, and at most to 2: what is beyond is as red as that
@@ -339,7 +342,7 @@ def _draw_map(axes: Any, x: Side, y: Side, drawn: Columns, colours: dict[str, An
     places: Any = np.searchsorted(y.places, drawn["y"]), np.searchsorted(x.places, drawn["x"])
     cells[places[0][order], places[1][order]] = order  # the last, and worst, stays
     states, margins = drawn["state"][cells], np.ma.masked_invalid(drawn["margin"][cells])
-    used = np.ma.masked_invalid(drawn["utilisation"][cells])
+    used = np.ma.masked_invalid(drawn["shade"][cells])
     mesh = axes.pcolormesh(x.edges, y.edges, used, **colours)
     for state, look in STATE_LOOKS.items():
         if look.hatch and (states == state).any():
@@ -390,6 +393,6 @@ def _draw_samples(axes: Any, x: Side, y: Side, drawn: Columns, colours: dict[str
             axes.scatter(*places, marker=look.marker, color=look.colour, s=36)
         elif there.any():
             style = {**colours, "edgecolor": "0.3", "linewidth": 0.6}
-            used = drawn["utilisation"][there]
+            used = drawn["shade"][there]
             shown = axes.scatter(*places, c=used, marker=look.marker, s=40, **style)
     return shown

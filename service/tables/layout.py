@@ -45,7 +45,8 @@ def console(stderr: bool = False) -> Console:
     """
     from rich.console import Console
 
-    screen = Console(highlight=False, stderr=stderr)
+    # what is in brackets or between colons is units and paths, no style
+    screen = Console(highlight=False, markup=False, emoji=False, stderr=stderr)
     # a narrower terminal wraps the lines of a table
     narrowest = 80
     if not stderr and screen.width < narrowest:
@@ -301,7 +302,7 @@ def _print_lines(rows: Iterable[Any], columns: Sequence[PrintedColumn], out: Con
     """Print a line for each row: heads and cells."""
     for row in rows:
         cells = [f"{column.head} {column.cell(row)}".strip() for column in columns]
-        out.print(", ".join(cells), markup=False)
+        out.print(", ".join(cells))
 
 
 def axis_unit(axis: str) -> str:

@@ -94,6 +94,16 @@ def test_it_is_proven_that_a_wall_with_a_gap_cannot_be_climbed(tmp_path, capsys)
 
 
 @pytest.mark.slow
+def test_a_search_whose_start_leads_nowhere_says_so(tmp_path, capsys):
+    """Its first node alone is known when the stances of the way to it fail."""
+    ends = ["--from", "height:0.8", "--to", "height:0.8", "--stand-off", "0.6"]
+    grids = ["--spacing", "0.4", "--body-spacing", "0.3", "--at-least", "1.2"]
+    given = ["climb", "small-wall:1", *ends, *grids, "-o", str(tmp_path), "-q"]
+    assert run_command_line(given) == OVERLOADED
+    assert "NONE" in capsys.readouterr().out
+
+
+@pytest.mark.slow
 def test_the_demonstration_climbs_and_its_route_is_planned_again(tmp_path, capsys, monkeypatch):
     # however slow the machine is
     patient = msgspec.structs.replace(climbs.demo_request(), time=None)

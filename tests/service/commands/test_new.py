@@ -123,6 +123,7 @@ def test_a_request_in_toml_is_that_in_json(start, tmp_path):
         ('surface = "rock"', "surface = 2026-01-01", "unknown surface '2026-01-01'"),
         ('surface = "rock"', 'surfaces = "rock"', "stance.hands[0].surfaces: unknown field"),
         ("diameter = 0.3", "diameter = -0.3", "stance.hands[0].hold.diameter: expected a number"),
+        ("diameter = 0.3", f"diameter = 1{'0' * 30}", "hold.diameter: expected a number <="),
         ("v = 1", "v = 1\nv = 1", "not valid TOML: Cannot overwrite a value"),
     ],
 )

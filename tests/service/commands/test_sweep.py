@@ -57,6 +57,7 @@ def test_a_sweep_writes_a_table_and_a_picture(tmp_path, capfd):
             ["holds for load.mass [kg]", "up to 90.0"],
         ),
         (["--vary", MASS, "--samples", "5", "--seed", "1"], ["5 points"]),
+        (["--vary", "load.mass=200:300:3"], ["holds nowhere from 200 to 300 of load.mass [kg]"]),
         (["--vary", "hands.*.surface=rock,sandpaper-36"], ["sandpaper-36", "overloaded"]),
         (
             ["--vary", "hands.front_left.grasp.closing_tension=1,40"],

@@ -288,6 +288,18 @@ def test_with_a_file_the_summary_is_what_is_printed(batch_file, tmp_path, capfd)
     assert cells["optimal"][0] == "2"
     assert cells["infeasible"] == ["0", "-", "-"]
     assert cells["error:"] == ["deadline", "1", "-", "-"]
+    assert run_command_line(["batch", path, "-o", str(kept), "--workers", "1", "-q"]) == 1
+    assert capfd.readouterr().out.startswith("answer optimal, requests 2, ")
+
+
+def test_there_is_nothing_to_export_before_a_batch_has_answered(batch_file, tmp_path, capfd):
+    table = ["-o", str(tmp_path / "t.csv"), "--export"]
+    assert run_command_line(["batch", batch_file(GOOD), *table]) == 2
+    err = capfd.readouterr().err
+    assert err == (
+        f"crux: --export: {tmp_path}/t.csv.jsonl has no answers of these requests; answer some "
+        "first\n"
+    )
 
 
 def test_a_batch_from_standard_input_goes_through_processes_of_its_own():

@@ -173,6 +173,7 @@ def test_zenoh_takes_every_configuration(tmp_path):
         (["add", "{made}", "x", "--role", "ros"], "--role: these keys are for no ROS domain"),
         (["add", "{new}", "x", "--role", "planner"], "DIR: {new}: has no keys.json"),
         (["remove", "{made}", "x"], "NAME: 'x' is not among the names: service, planner"),
+        ([], "Missing command; see crux keys --help"),
         (["list", "{new}"], "DIR: {new}: has no keys.json, so it is no folder of keys; crux keys"),
     ],
 )
@@ -204,7 +205,7 @@ def test_the_command_line_makes_adds_lists_and_removes(tmp_path, capfd):
     assert "ca-key.pem makes further names" in err
     assert run_command_line(["keys", "add", folder, "anna", "--role", "player"]) == DONE
     assert f"changed: {folder}/service.json5; copy" in " ".join(capfd.readouterr().err.split())
-    assert run_command_line(["keys", "list", folder, "--json"]) == DONE
+    assert run_command_line(["keys", "list", folder, "--json", "-q"]) == DONE
     listed = json.loads(capfd.readouterr().out)
     assert [(each["name"], each["role"]) for each in listed["names"]] == [
         ("service", "service"),

@@ -9,7 +9,10 @@ import re
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import pytest
+from matplotlib.collections import QuadMesh
+from matplotlib.figure import Figure
 
 import service
 from hand_models.base import InvalidInputError
@@ -200,6 +203,32 @@ def test_a_picture_is_over_the_chosen_pair(tmp_path: Path) -> None:
     plot_sweep(found, tmp_path / "a.png", "wall", (TENSION, SHEAR))
     with pytest.raises(InvalidInputError, match=r"load\.mass"):
         plot_sweep(found, tmp_path / "b.png", "wall", ("load.mass", "foo"))
+
+
+@pytest.mark.parametrize(
+    ("caps", "words"), [("0.5,1", "utilisation over its cap [1]"), ("1", "utilisation [1]")]
+)
+def test_colours_of_a_map_are_parts_of_each_points_own_cap(
+    caps: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[Figure] = []
+    monkeypatch.setattr(
+        "service.sweeping.pictures.write_picture", lambda figure, *_: drawn.append(figure)
+    )
+    found = service.sweep(WALL, ["load.mass=50:150:3", f"limits.utilisation={caps}"])
+    over = ("load.mass", "limits.utilisation") if "," in caps else None
+    if over is None:
+        found = service.sweep(WALL, ["load.mass=50:150:3", SHEAR + "=30:80:3"])
+    plot_sweep(found, tmp_path / "a.png", "wall", over)
+    axes, bar = drawn[0].axes
+    assert bar.get_ylabel() == words
+    (mesh,) = [each for each in axes.collections if isinstance(each, QuadMesh)]
+    shades = {
+        round(float(each), 9) for each in np.ma.compressed(np.ma.asarray(mesh.get_array()).ravel())
+    }
+    assert shades == {round(row.utilisation / row.cap, 9) for row in found.rows}
+    # white is at the cap
+    assert mesh.norm(1.0) == 0.5
 
 
 def test_a_sweep_that_is_broken_off_has_a_table(tmp_path: Path) -> None:
