@@ -28,6 +28,7 @@ from .posterior import (
     Posterior as Posterior,
     PosteriorSettings as PosteriorSettings,
     Sampled as Sampled,
+    as_draws as as_draws,
 )
 from .pulling import (
     Pulled as Pulled,

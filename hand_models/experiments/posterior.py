@@ -15,9 +15,12 @@ seed gives one result.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import itertools
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from importlib import resources
+from typing import Any, Final
 
 import numpy as np
 import scipy
@@ -25,10 +28,11 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, InvalidInputError
 from hand_models.experiments.gripper_fit import FITTED_FIGURES, GripperFit
+from hand_models.tile import Surface
 
 Flags = NDArray[np.bool_]
 
-__all__ = ["POSTERIOR_SETTINGS", "Posterior", "PosteriorSettings", "Sampled"]
+__all__ = ["POSTERIOR_SETTINGS", "Posterior", "PosteriorSettings", "Sampled", "as_draws"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,6 +264,34 @@ class Posterior:
                 off = ((mean - fit.wanted) ** 2 - fit.reading**2) / fit.size**2
                 squares.append(max(float(off[~used].mean()), 0.0))
         return float(np.sqrt(np.mean(squares)))
+
+
+def as_draws(data: Mapping[str, Any]) -> str:
+    """Return the kept sets of a study's data as text in the form of ``draws.toml``.
+
+    ``python -m hand_models.studies.calibrate DIR/result.json`` prints the text.
+
+    Parameters
+    ----------
+    data : mapping
+        ``data`` of the study's result, read from ``result.json``.
+    """
+    sets, names = data["sets"], [number["name"] for number in data["numbers"]]
+    columns = dict(zip(names, np.transpose([each["values"] for each in sets]), strict=True))
+    angle, slopes = Surface.named("sandpaper-36").pull_off_angle, columns["pull_off_slope"]
+    columns["pull_off_ratio"] = 1.0 / (np.cos(angle) + slopes * np.sin(angle))
+    columns["misfit"] = np.array([each["misfit"] for each in sets])
+
+    def replaced(entry: re.Match[str]) -> str:
+        values = ", ".join(f"{value:.4g}" for value in columns[entry["name"]])
+        return f"{entry['before']}[{values}]"
+
+    bundled = resources.files("hand_models.parameters").joinpath("draws.toml").read_text("utf-8")
+    # without the words about the file, which come first, and without the ranges, which come last
+    sections = bundled.partition("\n\n")[2].split("\n\n")
+    fitted = itertools.takewhile(lambda section: "[ranges]" not in section, sections)
+    form = r'(?P<before>"?(?P<name>[^"\s]+)"? = \{ value = )\[.*?\]'
+    return re.sub(form, replaced, "\n\n".join(fitted)) + "\n"
 
 
 def _terms(sets: Array) -> Array:
