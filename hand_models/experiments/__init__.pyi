@@ -15,6 +15,13 @@ from .gripper_fit import (
     ReadingErrors as ReadingErrors,
 )
 from .hard_stop import PalmExperiment as PalmExperiment
+from .linear_sets import (
+    asymmetry as asymmetry,
+    even_directions as even_directions,
+    linear_pieces as linear_pieces,
+    linearised as linearised,
+    spread as spread,
+)
 from .pictures import (
     PHALANX_COLOURS as PHALANX_COLOURS,
     conditions_title as conditions_title,
@@ -45,6 +52,7 @@ from .study_result import (
     Role as Role,
     StudyResult as StudyResult,
     StudyText as StudyText,
+    listed as listed,
     part as part,
     track as track,
 )
@@ -63,8 +71,10 @@ from .wrench_hull import (
     edge as edge,
     extents as extents,
     in_paper_signs as in_paper_signs,
+    loading_planes as loading_planes,
     reach_toward as reach_toward,
     section as section,
+    strongest as strongest,
     vertices as vertices,
     volume as volume,
     with_mirrored as with_mirrored,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from hand_models.base import COLOUR_OF, panel_grid
+from hand_models.base import COLOUR_OF
 from hand_models.experiments.force_limits import MEASURE_UNITS, Measure
 from hand_models.finger import PHALANGES
 
@@ -46,6 +46,7 @@ def panels(
     columns: int,
     size: tuple[float, float],
     grid: Literal["x", "y", "both", "none"] = "both",
+    solids: Collection[int] = (),
     **options: Any,
 ) -> tuple[Figure, list[Any]]:
     """Return a figure with a grid of axes.
@@ -57,19 +58,25 @@ def panels(
     size : tuple of float
         Width and height of the figure [inches].
     grid : {'x', 'y', 'both', 'none'}
-        Grid lines of the axes.
+        Grid lines of the axes in the plane.
+    solids : collection of int
+        Places of axes in three dimensions, row by row.
     **options
-        Keyword arguments of `matplotlib.figure.Figure.subplots`.
+        Keyword arguments of `matplotlib.figure.Figure.subplot_mosaic`.
 
     Returns
     -------
     tuple of (Figure, list of Axes)
         The axes row by row.
     """
-    figure, axes = panel_grid(rows * columns, columns, size, **options)
-    for each in axes if grid != "none" else ():
-        each.grid(axis=grid, alpha=0.3)
-    return figure, axes
+    figure = Figure(figsize=size, layout="constrained")
+    places: Any = np.arange(rows * columns).reshape(rows, columns).tolist()
+    solid: Any = {place: {"projection": "3d"} for place in solids}
+    axes = figure.subplot_mosaic(places, per_subplot_kw=solid, **options)
+    for place, each in axes.items() if grid != "none" else ():
+        if place not in solids:
+            each.grid(axis=grid, alpha=0.3)
+    return figure, list(axes.values())
 
 
 def label_solid(axes: Any, title: str) -> None:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from typing import Any, Literal, TypeAlias, TypeVar
 
 from hand_models.base import Progress
 
-__all__ = ["Claim", "Role", "StudyResult", "StudyText", "part", "track"]
+__all__ = ["Claim", "Role", "StudyResult", "StudyText", "listed", "part", "track"]
 
 Item = TypeVar("Item")
 
@@ -85,42 +85,25 @@ class StudyText:
         self._name, self._words = study, tomllib.loads(text)[study]
         self.claims: list[Claim] = []
 
-    def check(
-        self,
-        name: str,
-        got: str | float,
-        holds: object,
-        *,
-        claimed: float | None = None,
-        role: Role | None = None,
-        **values: Any,
-    ) -> None:
-        """Add a checked claim, with its text from ``studies.toml``.
+    def check(self, name: str, holds: object, **values: Any) -> None:
+        """Add a checked claim, with its texts from ``studies.toml``.
 
         Parameters
         ----------
         name : str
             Name of the claim in the file.
-        got : str or float
-            The model's value.
         holds : bool
             True if the model confirms the claim.
-        claimed : float, optional
-            The paper's value, in place of the file's.
-        role : {'test', 'calibration'}, optional
-            Role of the claim in place of the file's, which is ``test`` by default.
         **values
-            Values of the placeholders in the text.
+            Values of the placeholders in the texts. ``got``, ``claimed`` and ``role`` take the
+            place of the file's; the role is ``test`` by default.
         """
-        entry = self._words["claims"][name]
-        paper: str | float = entry["claimed"] if claimed is None else claimed
-        if isinstance(paper, str):
-            paper = paper.format(**values)
-        role = role or entry.get("role", "test")
-        self.claims.append(Claim(entry["claim"].format(**values), paper, got, bool(holds), role))
+        words = {**self._words["claims"][name], "holds": bool(holds)}
+        own = {key: values[key] for key in ("got", "claimed", "role") if key in values}
+        self.claims.append(Claim(**_filled(words | own, values)))
 
     def label(self, axes: Any, name: str, **values: Any) -> None:
-        """Set the title and labels of axes from ``studies.toml``.
+        """Set the title, labels and ranges of axes from ``studies.toml``.
 
         Parameters
         ----------
@@ -130,7 +113,7 @@ class StudyText:
         **values
             Values of the placeholders in the texts.
         """
-        axes.set(**{key: text.format(**values) for key, text in self._words["axes"][name].items()})
+        axes.set(**_filled(self._words["axes"][name], values))
 
     def result(self, data: dict[str, Any]) -> StudyResult:
         """Return the study's result: data, title from ``studies.toml``, and the claims checked.
@@ -142,6 +125,25 @@ class StudyText:
         """
         data = {**data, "not_tested": self._words["not_tested"]}
         return StudyResult(self._name, self._words["title"], data, tuple(self.claims))
+
+
+def _filled(words: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
+    """Return words with their placeholders filled in; numbers are as they are."""
+    return {k: w.format(**values) if isinstance(w, str) else w for k, w in words.items()}
+
+
+def listed(names: Iterable[object], values: Iterable[object], form: str = ".2f") -> str:
+    """Return values by their names in words, such as ``proximal 0.41, distal 0.20``.
+
+    Parameters
+    ----------
+    names, values : iterable
+        As many of one as of the other.
+    form : str
+        Format of a value, and what may follow it: ``.1f``.
+    """
+    pairs = zip(names, values, strict=True)
+    return ", ".join(f"{name} {value:{form}}" for name, value in pairs)
 
 
 def track(progress: Progress, items: Sequence[Item]) -> Iterator[Item]:

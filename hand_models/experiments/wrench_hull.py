@@ -11,7 +11,7 @@ less.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,8 +28,10 @@ __all__ = [
     "edge",
     "extents",
     "in_paper_signs",
+    "loading_planes",
     "reach_toward",
     "section",
+    "strongest",
     "vertices",
     "volume",
     "with_mirrored",
@@ -249,6 +251,69 @@ def distance_along(points: Array, directions: Array, start: ArrayLike = 0.0) -> 
     least = np.where(slopes < 0.0, ratios, -np.inf).max(axis=1)
     blocked = ((slopes == 0.0) & (gaps < 0.0)).any(axis=1)
     return np.where((most >= np.maximum(least, 0.0)) & ~blocked, most, np.nan)
+
+
+def loading_planes(points: Array) -> dict[str, Any]:
+    """Return the greatest force and moment of a hull in planes M_y = a F_x, and the best planes.
+
+    Both √(F_x² + F_z²) and the magnitude of M_y are convex, so that the best are at vertices of the
+    hull.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Wrenches of the part F_z ≤ 0 [N, N, N·m].
+
+    Returns
+    -------
+    dict
+        ``arm``: values of a, one for each plane [m]; ``force`` [N] and ``moment`` [N·m]: the
+        greatest in each plane;
+        ``best_for_force`` and ``best_for_moment``: the best over all planes, with
+        ``arms_as_good``, the range of arms within 1 % of the best.
+    """
+    size = np.abs(points).max(axis=0)
+    turns = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181)[1:-1]
+    arms = np.tan(turns) * size[2] / size[0]
+    slices = [_strengths(section(points, (arm, 0.0, -1.0))) for arm in arms]
+    planes: dict[str, Any] = {"arm": arms}
+    for name in ("force", "moment"):
+        planes[name] = np.array([strengths[name].max(initial=0.0) for strengths in slices])
+    for name, best in strongest(points).items():
+        good = arms[planes[name] >= (1.0 - 0.01) * best[name]]  # within 1 % of the best
+        alike = [good.min(), good.max()] if len(good) else None
+        planes[f"best_for_{name}"] = {**best, "arms_as_good": alike}
+    return planes
+
+
+def strongest(points: Array) -> dict[str, dict[str, Any]]:
+    """Return the wrenches of the greatest force and of the greatest moment, and their planes.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Wrenches [N, N, N·m].
+
+    Returns
+    -------
+    dict
+        For ``force`` and ``moment`` the ``wrench`` and its strength; ``arm``: M_y over F_x [m];
+        ``ratio``: F_x over M_y [1/m].
+    """
+    found = {}
+    for name, strengths in _strengths(points).items():
+        # of a wrench and its mirror image, which are as strong, that to the right
+        most = strengths.max()
+        alike = points[strengths >= (1.0 - BASE_TOLERANCES.relative) * most]
+        best = alike[alike[:, 0].argmax()]
+        arm, ratio = best[2] / best[0], best[0] / best[2]
+        found[name] = {"wrench": best, name: most, "arm": arm, "ratio": ratio}
+    return found
+
+
+def _strengths(points: Array) -> dict[str, Array]:
+    """Return what wrenches count for, by force and by moment."""
+    return {"force": np.hypot(points[:, 0], points[:, 1]), "moment": np.abs(points[:, 2])}
 
 
 def _slack(points: Array) -> float:

@@ -97,12 +97,10 @@ def _directions(angle: Array | float, azimuth: Array | float) -> Array:
 def _cartesian_line(angles: Array, strengths: Array, pull_off_angle: float) -> dict[str, float]:
     """Fit T + k P = T_0 to the curve up to φ_max, by least squares of the distance."""
     within = within_law(angles, pull_off_angle)
-    angles, strengths = angles[within], strengths[within]
-    points = strengths[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    points = (strengths * [np.cos(angles), np.sin(angles)]).T[within]
     centre = points.mean(axis=0)
     spread = points - centre
     normal = np.linalg.svd(spread)[2][1]
-    normal = normal * np.sign(normal[0])
     distance = spread @ normal
     return {
         "slope": float(normal[1] / normal[0]),
@@ -114,13 +112,13 @@ def _cartesian_line(angles: Array, strengths: Array, pull_off_angle: float) -> d
 
 def _table() -> list[dict[str, Any]]:
     """Simulate every cell of the measured table."""
-    cells, settings = [], STUDY_SETTINGS
+    cells = []
     for concrete in ("fine", "coarse"):
         array = SpineArray.named(f"concrete-{concrete}")
         for cell in measured_tile_shear(concrete):
             tile = replace(array, spines=cell.spines, backlash=cell.backlash)
-            rng = np.random.default_rng(settings.fig10_seed)
-            found = statistics(tile.simulate_drag(rng, settings.fig10_tiles))
+            rng = np.random.default_rng(STUDY_SETTINGS.fig10_seed)
+            found = statistics(tile.simulate_drag(rng, STUDY_SETTINGS.fig10_tiles))
             simulated = {"simulated_mean": found.mean, "simulated_deviation": found.deviation}
             cells.append({"concrete": concrete, **cell._asdict(), **simulated})
     return cells
@@ -167,38 +165,35 @@ def _check(text: StudyText, surface: Surface, array: SpineArray, data: dict[str,
     repeats = data["trials"]["strength"].shape[1]
     error = np.mean(data["array"]["deviation"][within_law(curve, limit)]) / math.sqrt(repeats)
     for name, key in (("linear_in_angle", "fit_of_mean"), ("straight", "cartesian_line_of_mean")):
-        line = data[key]
-        given = f"off by up to {line['worst']:.1f} N, R² {line['r_squared']:.2f}"
-        text.check(name, given, line["worst"] <= error, error=error)
+        text.check(name, data[key]["worst"] <= error, error=error, **data[key])
     fitted, planned = data["fit_of_trials"]["shear_limit"], surface.shear_limit
-    text.check("shear_limit", fitted, abs(fitted - planned) <= error, claimed=planned)
+    text.check("shear_limit", abs(fitted - planned) <= error, got=fitted, claimed=planned)
     ratio, at_limit = surface.pull_off_limit / planned, float(array.share(limit))
-    text.check("ratio", at_limit, abs(at_limit - ratio) <= 0.01 * ratio, claimed=ratio)
+    text.check("ratio", abs(at_limit - ratio) <= 0.01 * ratio, got=at_limit, claimed=ratio)
     # beyond φ_max the planner's law, which it holds there, is compared with the array at 60°
     far = math.radians(60.0)
     kept, beyond = float(surface.strength(far) / planned), float(array.share(far))
-    text.check("beyond", beyond, beyond >= kept, claimed=kept)
+    text.check("beyond", beyond >= kept, got=beyond, claimed=kept)
     pressed = curve[curve < 0.0]
     force, friction = array.share(pressed), array.tile_friction
     gained = float(np.polyfit(-force * np.sin(pressed), force * np.cos(pressed), 1)[0])
-    text.check("friction", gained, abs(gained - friction) <= 1e-6, claimed=friction)
+    text.check("friction", abs(gained - friction) <= 1e-6, got=gained, claimed=friction)
     for preset in ("concrete-coarse", "rock"):
         times = Surface.named(preset).shear_limit / planned
-        text.check(f"times_on_{preset}", times, 2.0 <= times <= 5.0)
+        text.check(f"times_on_{preset}", 2.0 <= times <= 5.0, got=times)
     enough = [cell for cell in data["tile_shear"] if cell["spines"] >= LEAST_SPINES]
     few = [cell for cell in data["tile_shear"] if cell["spines"] < LEAST_SPINES]
     for cells, name in ((enough, "strength_of_many"), (few, "strength_of_few")):
         off = [abs(cell["simulated_mean"] - cell["mean"]) / cell["error"] for cell in cells]
-        given = f"{sum(o <= 1.0 for o in off)} of {len(off)}; off by {max(off):.2f} bars or less"
-        text.check(name, given, max(off) <= 1.0)
+        within = sum(each <= 1.0 for each in off)
+        text.check(name, max(off) <= 1.0, within=within, of=len(off), most=max(off))
     for concrete in ("fine", "coarse"):
         cells = [cell for cell in enough if cell["concrete"] == concrete]
         ratios = [cell["simulated_deviation"] / cell["error"] for cell in cells]
-        given = f"{min(ratios):.2f} to {max(ratios):.2f}"
-        holds = min(ratios) >= 0.5 and max(ratios) <= 1.5
-        text.check("scatter", given, holds, concrete=concrete)
-    more = data["hull_over_surface"]
-    text.check("not_convex", more, more > 1.01)
+        least, most = min(ratios), max(ratios)
+        holds = least >= 0.5 and most <= 1.5
+        text.check("scatter", holds, concrete=concrete, least=least, most=most)
+    text.check("not_convex", data["hull_over_surface"] > 1.01, got=data["hull_over_surface"])
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
@@ -213,38 +208,28 @@ def plot(result: StudyResult) -> dict[str, Figure]:
 def _draw_curve(data: dict[str, Any]) -> Figure:
     """Draw the limit curve over the loading angle, and in Cartesian coordinates."""
     figure, (polar, cartesian) = panels(1, 2, (13.0, 5.0))
-    fit, limit = data["fit_of_trials"], data["planner"]["pull_off_angle"]
-    fitted = np.linspace(0.0, limit, 46)
-    line = fit["shear_limit"] + (fit["pull_off_limit"] - fit["shear_limit"]) * fitted / limit
-    low, _, high = data["array"]["quantiles_5_50_95"]
-    strengths, curve = data["trials"]["strength"], data["array"]["angle"]
+    text, blue = StudyText("fig10"), COLOUR_OF["blue"]
+    fit, planner, array = data["fit_of_trials"], data["planner"], data["array"]
+    fitted = np.linspace(0.0, planner["pull_off_angle"], 46)
+    ends = fit["shear_limit"], fit["pull_off_limit"]
+    line = np.interp(fitted, fitted[[0, -1]], ends)
+    low, _, high = array["quantiles_5_50_95"]
+    strengths, curve = data["trials"]["strength"], array["angle"]
     at = np.repeat(data["trials"]["angle"], strengths.shape[1])
-    dots = {"marker": ".", "linestyle": "", "color": COLOUR_OF["blue"], "alpha": 0.6}
-    dotted = {"linestyle": ":", "color": "k"}
     polar.axvspan(-30.0, 0.0, color="0.9")
-    polar.fill_between(
-        np.degrees(curve), low, high, color=COLOUR_OF["blue"], alpha=0.15, linewidth=0.0
-    )
+    polar.fill_between(np.degrees(curve), low, high, color=blue, alpha=0.15, linewidth=0.0)
     cartesian.axhspan(0.0, -20.0, color="0.9")
+    dots = {"marker": ".", "ls": "", "color": blue, "alpha": 0.6}
     for angles, strength, label, of_points, style in (
         (at, strengths.ravel(), None, "70 simulated trials", dots),
         (fitted, line, "Eq. 21 fitted to the trials", None, {"color": COLOUR_OF["red"]}),
-        (
-            curve,
-            data["array"]["mean"],
-            "spine array, mean",
-            None,
-            {"color": COLOUR_OF["blue"]},
-        ),
-        (curve, data["planner"]["law"], "planner, Eq. 21", None, {"color": "k"}),
-        (curve, data["planner"]["half_plane"], "planner, half-planes", None, dotted),
+        (curve, array["mean"], "spine array, mean", None, {"color": blue}),
+        (curve, planner["law"], "planner, Eq. 21", None, {"color": "k"}),
+        (curve, planner["half_plane"], "planner, half-planes", None, {"color": "k", "ls": ":"}),
     ):
         polar.plot(np.degrees(angles), strength, label=label, **style)
         shear, pull_off = strength * np.cos(angles), strength * np.sin(angles)
         cartesian.plot(shear, pull_off, label=of_points, **style)
-    polar.set(xlim=(-30.0, 90.0), ylim=(0.0, 60.0))
-    cartesian.set(xlim=(0.0, 50.0), ylim=(-20.0, 20.0))
-    text = StudyText("fig10")
     text.label(polar, "polar")
     text.label(cartesian, "cartesian")
     polar.legend()
@@ -255,27 +240,22 @@ def _draw_curve(data: dict[str, Any]) -> Figure:
 def _draw_table(data: dict[str, Any]) -> Figure:
     """Draw the measured and the simulated strengths over the number of spines."""
     figure, both = panels(1, 2, (11.0, 4.4), sharey=True)
-    highest, text = (
-        1.3 * max(cell["mean"] + cell["error"] for cell in data["tile_shear"]),
-        StudyText("fig10"),
-    )
+    highest = 1.3 * max(cell["mean"] + cell["error"] for cell in data["tile_shear"])
     for axes, concrete in zip(both, ("fine", "coarse"), strict=True):
         cells = [cell for cell in data["tile_shear"] if cell["concrete"] == concrete]
         ordered = itertools.groupby(cells, key=lambda cell: cell["backlash"])
-        for (backlash, group), colour in zip(
-            ordered, (COLOUR_OF["blue"], COLOUR_OF["green"]), strict=True
-        ):
+        colours = COLOUR_OF["blue"], COLOUR_OF["green"]
+        for (backlash, group), colour in zip(ordered, colours, strict=True):
             keys = ("spines", "mean", "error", "simulated_mean", "simulated_deviation")
             found = np.array([[row[key] for key in keys] for row in group])
             spines, mean, error, simulated, deviation = found.T
-            name, style = f"{1e3 * backlash:g} mm of play", {"color": colour}
-            axes.errorbar(
-                spines, mean, error, fmt="o", capsize=3, label=f"measured, {name}", **style
-            )
-            axes.plot(spines, simulated, label=f"simulated, {name}", **style)
+            name = f"{1e3 * backlash:g} mm of play"
+            measured = {"fmt": "o", "capsize": 3, "color": colour, "label": f"measured, {name}"}
+            axes.errorbar(spines, mean, error, **measured)
+            axes.plot(spines, simulated, color=colour, label=f"simulated, {name}")
             band = simulated - deviation, simulated + deviation
-            axes.fill_between(spines, *band, alpha=0.15, **style)
-        text.label(axes, "concrete", concrete=concrete)
+            axes.fill_between(spines, *band, color=colour, alpha=0.15)
+        StudyText("fig10").label(axes, "concrete", concrete=concrete)
         axes.set_ylim(0.0, highest)
         axes.legend(loc="upper left")
     both[0].set_ylabel("tile's strength in shear [N]; bars and bands: scatter")
@@ -286,7 +266,7 @@ def _draw_surface() -> Figure:
     """Draw the strength over the azimuth at three loading angles."""
     surface, array = Surface.named("sandpaper-36"), SpineArray.named("sandpaper-36")
     figure, shown = panels(1, 3, (13.0, 4.6))
-    azimuth, text = np.radians(np.linspace(-90.0, 90.0, 181)), StudyText("fig10")
+    azimuth = np.radians(np.linspace(-90.0, 90.0, 181))
     for axes, part in zip(shown, (0.0, 0.5, 1.0), strict=True):
         angle = part * surface.pull_off_angle
         directions = _directions(angle, azimuth)
@@ -295,19 +275,16 @@ def _draw_surface() -> Figure:
             directional_strength(inner_half_planes(replace(surface, half_planes=n)), directions)
             for n in (1, 4)
         )
-        for radius, style, label in (
-            (
-                drag * array.share(angle, azimuth),
-                COLOUR_OF["blue"],
-                "spine array, to its level",
-            ),
-            (surface.strength(angle, azimuth), "k-", "planner's surface"),
-            (one, "k:", "half-planes: 1"),
-            (four, "k--", "half-planes: 4"),
+        own = drag * array.share(angle, azimuth)
+        for radius, colour, style, label in (
+            (own, COLOUR_OF["blue"], "-", "spine array, to its level"),
+            (surface.strength(angle, azimuth), "k", "-", "planner's surface"),
+            (one, "k", ":", "half-planes: 1"),
+            (four, "k", "--", "half-planes: 4"),
         ):
             shear, _, lateral = radius * directions.T
-            axes.plot(shear, lateral, style, label=label)
-        text.label(axes, "azimuth", angle=math.degrees(angle))
+            axes.plot(shear, lateral, color=colour, linestyle=style, label=label)
+        StudyText("fig10").label(axes, "azimuth", angle=math.degrees(angle))
         axes.set_aspect("equal")
     handles, labels = shown[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))

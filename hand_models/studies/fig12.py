@@ -13,19 +13,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from hand_models import experiments
 from hand_models.base import COLOUR_OF, Array, Progress
 from hand_models.compliance import FingerLoads, Gripper, gripper_table
-from hand_models.experiments import (
-    FIT_TOLERANCES,
-    PHALANX_COLOURS,
-    Conditions,
-    StudyResult,
-    StudyText,
-    panels,
-    pull,
-    pulled_off_poses,
-    unloaded,
-)
+from hand_models.experiments import FIT_TOLERANCES, Conditions, StudyResult, StudyText
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table
 from hand_models.studies.settings import STUDY_SETTINGS
@@ -40,29 +31,31 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     The gripper is also pulled along other directions of (F_x, F_z), for the shift of its base.
     """
     progress(0, 1)
-    table = experiment_table()
-    conditions = Conditions.of_figure("fig12")
+    table, conditions = experiment_table(), Conditions.of_figure("fig12")
     gripper = conditions.gripper(gripper_table(hand))
-    rest = unloaded(gripper)
-    slip = pull(gripper, np.array([[0.0, -1.0, 0.0]]))
-    pulls = np.linspace(0.0, table.scalar("fig12", "pull"), STUDY_SETTINGS.fig12_points)
-    poses = pulled_off_poses(gripper, pulls)
-    further = np.linspace(0.0, -slip.wrenches[0, 1], STUDY_SETTINGS.fig12_points)
+    rest, slip = (
+        experiments.unloaded(gripper),
+        experiments.pull(gripper, np.array([[0.0, -1.0, 0.0]])),
+    )
+    pulled, most = table.scalar("fig12", "pull"), -slip.wrenches[0, 1]
+    pulls, further = (np.linspace(0.0, to, STUDY_SETTINGS.fig12_points) for to in (pulled, most))
+    poses = experiments.pulled_off_poses(gripper, pulls)
     beyond, at_slip, loads = (
         gripper.finger_loads(at)[0]
-        for at in (pulled_off_poses(gripper, further), slip.poses, poses)
+        for at in (experiments.pulled_off_poses(gripper, further), slip.poses, poses)
     )
     # of (F_x, F_z), in whose directions the shift of the base is looked at, too
     turns = np.linspace(-np.pi / 2, np.pi / 2, 25)
-    around = np.column_stack([np.sin(turns), -np.cos(turns), np.zeros(len(turns))])
-    elsewhere = pull(gripper, around)
+    elsewhere = experiments.pull(
+        gripper, np.column_stack([np.sin(turns), -np.cos(turns), 0.0 * turns])
+    )
     progress(1, 1)
     # of each phalanx, the largest of its limits
-    pieces = inner_half_planes(gripper.surface)
     used = [
         (piece.a_shear * at_slip.shears[0] + piece.a_normal * at_slip.normals[0]) / piece.capacity
-        for piece in pieces
+        for piece in inner_half_planes(gripper.surface)
     ]
+    lines = [f"{kind}_{end}" for kind in ("shear", "normal") for end in ("unloaded", "pulled")]
     data: dict[str, Any] = {
         "diameter": conditions.diameter,
         "tension": conditions.tension,
@@ -72,16 +65,12 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "normal": loads.normals,
         "base": poses[:, 1],
         "condition": np.linalg.cond(balance_matrix(gripper, poses, loads)),
-        "pull_of_figure": table.scalar("fig12", "pull"),
-        "read_off": {
-            f"{kind}_{end}": table.vector("fig12", f"{kind}_{end}")
-            for kind in ("shear", "normal")
-            for end in ("unloaded", "pulled")
-        },
+        "pull_of_figure": pulled,
+        "read_off": {line: table.vector("fig12", line) for line in lines},
         "condition_printed": table.scalar("fig12", "condition"),
         "until_slip": {"pull": further, "shear": beyond.shears, "normal": beyond.normals},
         "slip": {
-            "pull": -slip.wrenches[0, 1],
+            "pull": most,
             "phalanx": slip.phalanx[0],
             "way": slip.way[0],
             "utilisation": gripper.evaluate(slip.poses).utilisation[0],
@@ -117,11 +106,10 @@ def balance_matrix(gripper: Gripper, poses: Array, loads: FingerLoads) -> Array:
     loads : FingerLoads
         Loads of the finger at these poses.
     """
-    count = len(PHALANGES)
-    spacing = gripper.finger.model.joint_spacing
-    u = np.asarray(loads.directions, dtype=float)
-    base = np.column_stack([np.zeros(len(poses)), poses[:, 1]])[:, None]
-    joints = base + np.concatenate([0.0 * base, spacing * np.cumsum(u[:, :-1], axis=1)], axis=1)
+    count, u = len(PHALANGES), np.asarray(loads.directions, dtype=float)
+    # of each joint, proximal first: the base, and where the phalanges before it end
+    ends = gripper.finger.model.joint_spacing * np.cumsum(u[:, :-1], axis=1)
+    joints = np.pad(ends, ((0, 0), (1, 0), (0, 0))) + poses[:, None, :2]
     A = np.zeros((len(poses), 2 * count, 2 * count))
     for j in range(count):
         A[:, count + j, 2 * j : 2 * j + 2] = u[:, j]
@@ -132,67 +120,64 @@ def balance_matrix(gripper: Gripper, poses: Array, loads: FingerLoads) -> Array:
 
 
 def _check_lines(text: StudyText, data: dict[str, Any], table: ParameterTable) -> None:
+    share, least = FIT_TOLERANCES.force_share, FIT_TOLERANCES.least_force
     for kind in ("shear", "normal"):
         for end, where, at in (("unloaded", "without load", 0), ("pulled", "at the end", -1)):
             read, got = np.array(data["read_off"][f"{kind}_{end}"]), data[kind][at]
-            near = np.abs(got - read) <= np.maximum(
-                FIT_TOLERANCES.force_share * read, FIT_TOLERANCES.least_force
-            )
+            near = (np.abs(got - read) <= np.maximum(share * read, least)).all()
             there = data["pull"][at]
-            given = f"{_listed(got)} N; pulled by {there:g} N"
-            holds = (at == 0 or there == data["pull_of_figure"]) and near.all()
-            text.check("ends", given, holds, kind=kind, where=where, read=_listed(read))
+            holds = (at == 0 or there == data["pull_of_figure"]) and near
+            forces = {"read": _listed(read), "given": _listed(got)}
+            text.check("ends", holds, kind=kind, where=where, there=there, **forces)
     for kind, signs, course in (
         ("shear", (1, 1, 1), "shear forces increase gradually on every phalanx"),
         ("normal", (-1, 0, -1), "the normal forces of proximal and distal phalanx decrease"),
         ("normal", (0, 1, 0), "the normal force of the middle phalanx rises"),
     ):
         meant = np.flatnonzero(signs)
-        total = data[kind][-1] - data[kind][0]
+        total = (data[kind][-1] - data[kind][0])[meant]
         rising = data[kind][:, meant] * np.array(signs)[meant]
         back = float((np.maximum.accumulate(rising) - rising).max())
-        given = ", ".join(f"{PHALANGES[i]} {total[i]:+.2f}" for i in meant) + " N"
+        given = experiments.listed(np.array(PHALANGES)[meant], total, "+.2f") + " N"
         given += f"; {back:.1g} N back on the way" if back > 0.0 else ""
-        text.check("course", given, (rising[-1] > rising[0]).all(), course=course)
+        text.check("course", (rising[-1] > rising[0]).all(), got=given, course=course)
     for kind, span in zip(("shear", "normal"), table.vector("fig12", "sensor_range"), strict=True):
         within = table.scalar("fig12", "sensor_accuracy") * span
         fitted = np.polynomial.polynomial.polyfit(data["pull"], data[kind], 1)
         straight = np.polynomial.polynomial.polyval(data["pull"], fitted).T
         off = float(np.abs(data[kind] - straight).max())
-        text.check("straight", f"off by up to {off:.2g} N", off <= within, kind=kind, within=within)
-    condition, least = data["condition"], data["condition_printed"]
-    given = f"{condition.min():.0f} to {condition.max():.0f}"
-    text.check("condition", given, condition.min() > least, least=least)
+        text.check("straight", off <= within, kind=kind, within=within, off=off)
+    lowest, highest = data["condition"].min(), data["condition"].max()
+    printed = data["condition_printed"]
+    text.check("condition", lowest > printed, least=printed, lowest=lowest, highest=highest)
 
 
 def _check_slip(text: StudyText, data: dict[str, Any], table: ParameterTable) -> None:
-    slip = data["slip"]
-    first, used = slip["phalanx"], slip["utilisation_by_phalanx"]
-    given = f"{first}, at {slip['pull']:.1f} N ({slip['way'].replace('_', ' ')})"
-    text.check("first", given, first in ("proximal", "distal"))
-    given = ", ".join(f"{name} {u:.2f}" for name, u in zip(PHALANGES, used, strict=True))
-    text.check("middle", given, used[1] < 1.0)
+    slip, used = data["slip"], data["slip"]["utilisation_by_phalanx"]
+    slipping = {**slip, "way": slip["way"].replace("_", " ")}
+    text.check("first", slip["phalanx"] in ("proximal", "distal"), **slipping)
+    text.check("middle", used[1] < 1.0, got=experiments.listed(PHALANGES, used))
     shift, own = table.scalar("fig12", "base_shift"), slip["base_shift"]
     furthest = data["base_shift_elsewhere"]["shift"].max()
-    given = f"{1e3 * own:.2f} mm; pulled aside, up to {1e3 * furthest:.2f} mm"
     near = 0.25  # share within which the base's shift is the paper's
     holds = abs(max(own, furthest) - shift) <= near * shift
-    text.check("base", given, holds, shift=1e3 * shift, near=100 * near)
+    shifts = {"own": 1e3 * own, "furthest": 1e3 * furthest, "shift": 1e3 * shift}
+    text.check("base", holds, near=100 * near, **shifts)
 
 
-def _listed(values: Array) -> str:
-    return ", ".join(f"{value:.2f}" for value in values)
+def _listed(forces: Array) -> str:
+    return ", ".join(f"{force:.2f}" for force in forces)
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw the phalanges' shear and normal forces over the pull, and the condition number of A."""
     data, slip, text = result.data, result.data["slip"], StudyText("fig12")
-    figure, (shear, normal, condition) = panels(1, 3, (14.0, 4.4))
+    figure, (shear, normal, condition) = experiments.panels(1, 3, (14.0, 4.4))
     for axes, kind in ((shear, "shear"), (normal, "normal")):
-        for i, (name, colour) in enumerate(PHALANX_COLOURS.items()):
+        for i, (name, colour) in enumerate(experiments.PHALANX_COLOURS.items()):
+            read = [data["read_off"][f"{kind}_{end}"][i] for end in ("unloaded", "pulled")]
             axes.plot(data["pull"], data[kind][:, i], color=colour, label=name)
             axes.plot(data["until_slip"]["pull"], data["until_slip"][kind][:, i], ":", color=colour)
-            read = [data["read_off"][f"{kind}_{end}"][i] for end in ("unloaded", "pulled")]
             axes.plot([0.0, data["pull_of_figure"]], read, "o", color=colour, mfc="white")
             axes.plot(slip["pull"], slip[kind][i], "x", color=colour)
         text.label(axes, "forces", kind=kind)

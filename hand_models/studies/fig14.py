@@ -9,29 +9,16 @@ loads the plane M_y = a F_x.
 
 from __future__ import annotations
 
-from collections import Counter
+import collections
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.base import BASE_TOLERANCES, Array, Progress
+from hand_models import experiments
+from hand_models.base import Progress
 from hand_models.compliance import gripper_table
-from hand_models.experiments import (
-    PHALANX_COLOURS,
-    Conditions,
-    Role,
-    StudyResult,
-    StudyText,
-    clipped_vertices,
-    explored,
-    extents,
-    label_solid,
-    panels,
-    part,
-    section,
-    volume,
-)
+from hand_models.experiments import Conditions, Role, StudyResult, StudyText, loading_planes
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table
 from hand_models.studies.settings import STUDY_SETTINGS
@@ -43,18 +30,13 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     """Compute failing phalanges and best planes of loading for each diameter and tension."""
     table = experiment_table()
     diameters, tension = table.vector("fig14", "diameters"), table.scalar("fig14", "tension")
-    larger = max(diameters)
-    cases = [
-        *(Conditions(diameter, tension, "sandpaper-36") for diameter in diameters),
-        *(
-            Conditions(larger, held, "sandpaper-36")
-            for held in table.vector("fig14", "other_tensions")
-        ),
-    ]
+    cases = [(diameter, tension) for diameter in diameters]
+    cases += [(max(diameters), other) for other in table.vector("fig14", "other_tensions")]
     surfaces, steps = [], 1000  # of progress in all
-    for done, conditions in enumerate(cases):
+    for done, case in enumerate(cases):
         start, end = (steps * i // len(cases) for i in (done, done + 1))
-        surfaces.append(_surface(conditions, hand, part(progress, start, end, steps)))
+        report = experiments.part(progress, start, end, steps)
+        surfaces.append(_surface(Conditions(*case, "sandpaper-36"), hand, report))
     progress(steps, steps)
     # the two diameters with the same tension come first
     text, of_diameters = StudyText("fig14"), surfaces[:2]
@@ -67,18 +49,18 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
 def _surface(conditions: Conditions, hand: ParameterTable, progress: Progress) -> dict[str, Any]:
     """Return hull, failures and planes of the gripper on one surface."""
     gripper = conditions.gripper(gripper_table(hand))
-    _, pulled, wrenches = explored(gripper, STUDY_SETTINGS.fig14_pulls, progress)
-    shown = clipped_vertices(wrenches)
+    _, pulled, wrenches = experiments.explored(gripper, STUDY_SETTINGS.fig14_pulls, progress)
+    shown = experiments.clipped_vertices(wrenches)
     # in an order that is everyone's
     shown = shown[np.lexsort(shown.T)]
     # in how many of the directions each phalanx fails in each way
-    counts = Counter(zip(pulled.phalanx, pulled.way, strict=True))
+    counts = collections.Counter(zip(pulled.phalanx, pulled.way, strict=True))
     return {
         "diameter": conditions.diameter,
         "tension": conditions.tension,
         "hull_vertices": shown,
-        "extents": extents(shown)._asdict(),
-        "volume": volume(shown),
+        "extents": experiments.extents(shown)._asdict(),
+        "volume": experiments.volume(shown),
         "pulls": {
             "wrenches": pulled.wrenches,
             "side": pulled.side,
@@ -90,63 +72,8 @@ def _surface(conditions: Conditions, hand: ParameterTable, progress: Progress) -
             for (phalanx, way), count in counts.most_common()
         ],
         "planes": loading_planes(shown),
-        "best_pulls": _best(pulled.wrenches),
+        "best_pulls": experiments.strongest(pulled.wrenches),
     }
-
-
-def loading_planes(points: Array) -> dict[str, Any]:
-    """Return the greatest force and moment of a hull in planes M_y = a F_x, and the best planes.
-
-    Both √(F_x² + F_z²) and the magnitude of M_y are convex, so that the best are at vertices of the
-    hull.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, 3)
-        Wrenches of the part F_z ≤ 0 [N, N, N·m].
-
-    Returns
-    -------
-    dict
-        ``arm``: values of a, one for each plane [m]; ``force`` [N] and ``moment`` [N·m]: the
-        greatest in each plane;
-        ``best_for_force`` and ``best_for_moment``: the best over all planes, with
-        ``arms_as_good``, the range of arms within 1 % of the best.
-    """
-    size = np.abs(points).max(axis=0)
-    turns = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181)[1:-1]
-    arms = np.tan(turns) * size[2] / size[0]
-    slices = [_strengths(section(points, (arm, 0.0, -1.0))) for arm in arms]
-    planes: dict[str, Any] = {"arm": arms}
-    for name in ("force", "moment"):
-        planes[name] = np.array([strengths[name].max(initial=0.0) for strengths in slices])
-    for name, best in _best(points).items():
-        good = arms[planes[name] >= (1.0 - 0.01) * best[name]]  # within 1 % of the best
-        alike = [good.min(), good.max()] if len(good) else None
-        planes[f"best_for_{name}"] = {**best, "arms_as_good": alike}
-    return planes
-
-
-def _strengths(points: Array) -> dict[str, Array]:
-    """Return what wrenches count for, by force and by moment."""
-    return {"force": np.hypot(points[:, 0], points[:, 1]), "moment": np.abs(points[:, 2])}
-
-
-def _best(points: Array) -> dict[str, dict[str, Any]]:
-    """Return the wrenches of the greatest force and of the greatest moment, and their planes."""
-    found = {}
-    for name, strengths in _strengths(points).items():
-        # of a wrench and its mirror image, which are as strong, that to the right
-        most = strengths.max()
-        alike = points[strengths >= (1.0 - BASE_TOLERANCES.relative) * most]
-        best = alike[alike[:, 0].argmax()]
-        found[name] = {
-            "wrench": best,
-            name: most,
-            "arm": best[2] / best[0],
-            "ratio": best[0] / best[2],
-        }
-    return found
 
 
 def _listed(surface: dict[str, Any]) -> str:
@@ -158,22 +85,21 @@ def _listed(surface: dict[str, Any]) -> str:
 
 
 def _check_failures(text: StudyText, near: dict[str, Any], far: dict[str, Any]) -> None:
-    wrenches, _, phalanges, _ = near["pulls"].values()
-    proximal = phalanges.count("proximal") > 0.5 * len(phalanges)
-    text.check("proximal_first", _listed(near), proximal)
-    arms, distal = np.abs(wrenches[:, 2] / wrenches[:, 0]), np.array(phalanges) == "distal"
-    given, small = "no distal failure", False
+    phalanges = np.array(near["pulls"]["phalanx"])
+    text.check("proximal_first", (phalanges == "proximal").mean() > 0.5, got=_listed(near))
+    force_x, _, moment = near["pulls"]["wrenches"].T
+    arms, distal = 1e3 * np.abs(moment / force_x), phalanges == "distal"
     if distal.any():
         here, others = np.median(arms[distal]), np.median(arms[~distal])
-        given = f"median M_y : F_x {1e3 * here:.1f} mm, {1e3 * others:.1f} mm where others fail"
-        small = bool(here < others)
-    text.check("distal_where", given, small)
+        text.check("distal_where", here < others, here=here, others=others)
+    else:
+        text.check("distal_where", False, got="no distal failure")
     beside = ("dragged_backwards", "no_pose")  # no limits of a tile
     limits = [entry for entry in far["shares"] if entry["way"] not in beside]
     mine = sum(entry["share"] for entry in limits if entry["phalanx"] == "proximal")
-    letting_go = mine / sum(entry["share"] for entry in limits) if limits else 0.0
-    given = f"{_listed(far)}; of tiles that let go {100 * letting_go:.1f} %"
-    text.check("proximal_only", given, set(far["pulls"]["phalanx"]) == {"proximal"})
+    letting_go = 100 * mine / sum(entry["share"] for entry in limits) if limits else 0.0
+    only = set(far["pulls"]["phalanx"]) == {"proximal"}
+    text.check("proximal_only", only, shares=_listed(far), letting_go=letting_go)
 
 
 def _check_planes(text: StudyText, surfaces: list[dict[str, Any]], table: ParameterTable) -> None:
@@ -183,41 +109,33 @@ def _check_planes(text: StudyText, surfaces: list[dict[str, Any]], table: Parame
         where = f"on {1e3 * surface['diameter']:g} mm"
         # the gripper's numbers were fitted to those planes on the surface of Fig. 13
         role: Role = "calibration" if surface["diameter"] == fitted else "test"
-        planes, ratios = surface["planes"], []
+        planes, ratios = surface["planes"], {}
         for name, aim in (("force", "point force"), ("moment", "moment")):
             best, printed = planes[f"best_for_{name}"], table.scalar("fig14", f"{name}_ratio")
             there = np.interp(1.0 / printed, planes["arm"], planes[name]) / best[name]
-            ratio = best["ratio"]
-            given = (
-                f"{ratio:.3g} : 1 (M_y : F_x {1e3 * best['arm']:.1f} mm); at {printed:g} : 1 "
-                f"{100 * there:.1f} % of the best; best of straight pulls "
-                f"{surface['best_pulls'][name]['ratio']:.3g} : 1"
-            )
+            ratios[name] = ratio = best["ratio"]
+            pulled = surface["best_pulls"][name]["ratio"]
+            found = {"ratio": ratio, "arm": 1e3 * best["arm"], "there": 100 * there}
+            found |= {"printed": printed, "about": 100 * about, "pulled": pulled}
             holds = abs(ratio - printed) <= about * printed
-            words: dict[str, Any] = {"where": where, "aim": aim, "printed": printed}
-            text.check("best_plane", given, holds, role=role, about=100 * about, **words)
-            ratios.append(ratio)
-        force, moment = ratios
-        given = f"{force:.3g} : 1 for force, {moment:.3g} : 1 for moment"
-        text.check("higher_for_force", given, 0.0 < moment < force, where=where)
+            text.check("best_plane", holds, role=role, where=where, aim=aim, **found)
+        holds = 0.0 < ratios["moment"] < ratios["force"]
+        text.check("higher_for_force", holds, where=where, **ratios)
     anchor, best = table.scalar("fig14", "anchor"), surfaces[0]["planes"]["best_for_force"]
-    span = "nowhere else"
+    arm, span = best["arm"], "nowhere else"
     if best["arms_as_good"]:
         span = "from {:.2f} to {:.2f} cm".format(*(100 * arm for arm in best["arms_as_good"]))
-    given = f"{100 * best['arm']:.2f} cm; within 1 % of the best {span}"
-    holds = abs(best["arm"] - anchor) <= about * anchor
-    text.check("anchor", given, holds, anchor=100 * anchor, about=100 * about)
+    found = {"arm": 100 * arm, "anchor": 100 * anchor, "about": 100 * about}
+    text.check("anchor", abs(arm - anchor) <= about * anchor, span=span, **found)
 
 
 def _check_sizes(text: StudyText, near: dict[str, Any], *others: dict[str, Any]) -> None:
+    sizes = {**near["extents"], "volume": near["volume"]}
     for surface in others:
-        of = [surface["extents"][name] / near["extents"][name] for name in near["extents"]]
-        size = surface["volume"] / near["volume"]
-        shares = zip(("F_x", "F_z", "M_y"), of, strict=True)
-        given = ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares)
-        given += f", volume {100 * size:.0f} % of that on 300 mm"
+        here = {**surface["extents"], "volume": surface["volume"]}
+        shares = {name: 100 * here[name] / size for name, size in sizes.items()}
         tensions = {"far": surface["tension"], "near": near["tension"]}
-        text.check("smaller", given, max(*of, size) < 1.0, **tensions)
+        text.check("smaller", max(shares.values()) < 100.0, **shares, **tensions)
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
@@ -232,25 +150,20 @@ def _name(surface: dict[str, Any]) -> str:
 
 
 def _draw_failures(surfaces: list[dict[str, Any]]) -> Figure:
-    figure, text = Figure(figsize=(15.0, 9.0), layout="constrained"), StudyText("fig14")
-    for row, surface in enumerate(surfaces):
-        solid: Any = figure.add_subplot(2, 3, 3 * row + 1, projection="3d")
-        top, side = (figure.add_subplot(2, 3, 3 * row + k) for k in (2, 3))
-        wrenches = surface["pulls"]["wrenches"]
-        fails = np.array(surface["pulls"]["phalanx"])
-        dragged = np.array(surface["pulls"]["way"]) == "dragged_backwards"
-        for phalanx, colour in PHALANX_COLOURS.items():
+    figure, axes = experiments.panels(2, 3, (15.0, 9.0), solids=(0, 3))
+    text = StudyText("fig14")
+    for surface, solid, top, side in zip(surfaces, axes[::3], axes[1::3], axes[2::3], strict=True):
+        wrenches, name = surface["pulls"]["wrenches"], _name(surface)
+        fails, ways = (np.array(surface["pulls"][key]) for key in ("phalanx", "way"))
+        dragged = ways == "dragged_backwards"
+        for phalanx, colour in experiments.PHALANX_COLOURS.items():
             for marker, those, how in (
                 (".", ~dragged, "lets go"),
                 ("x", dragged, "dragged backwards"),
             ):
                 x, z, moment = wrenches[(fails == phalanx) & those].T
+                style: Any = {"color": colour, "marker": marker, "label": f"{phalanx} {how}"}
                 if len(x):
-                    style: dict[str, Any] = {
-                        "color": colour,
-                        "marker": marker,
-                        "label": f"{phalanx} {how}",
-                    }
                     solid.scatter(x, moment, z, s=12, depthshade=False, **style)
                     top.scatter(x, moment, s=14, **style)
                     side.scatter(x, z, s=14, **style)
@@ -260,24 +173,22 @@ def _draw_failures(surfaces: list[dict[str, Any]]) -> Figure:
             best = surface["planes"][f"best_for_{key}"]
             top.plot(ends, best["arm"] * ends, line, label=f"best for {key}: {best['ratio']:.3g}:1")
         top.set_ylim(1.15 * low[2], 1.9 * high[2])
-        label_solid(solid, f"{_name(surface)}: first failure, F_z downward")
-        for axes, view in ((top, "top"), (side, "side")):
-            text.label(axes, view, surface=_name(surface))
-            axes.grid(alpha=0.3)
+        experiments.label_solid(solid, f"{name}: first failure, F_z downward")
+        text.label(top, "top", surface=name)
+        text.label(side, "side", surface=name)
         top.legend(fontsize=8, loc="upper left")
     return figure
 
 
 def _draw_planes(surfaces: list[dict[str, Any]]) -> Figure:
-    figure, both = panels(1, 2, (12.0, 4.4))
-    strengths = {"force": "largest √(F_x² + F_z²) [N]", "moment": "largest M_y [N·m]"}
-    for axes, (key, strength) in zip(both, strengths.items(), strict=True):
+    figure, both = experiments.panels(1, 2, (12.0, 4.4))
+    for axes, key in zip(both, ("force", "moment"), strict=True):
         for surface in surfaces:
             planes = surface["planes"]
             (line,) = axes.plot(1e3 * planes["arm"], planes[key], label=_name(surface))
             best = planes[f"best_for_{key}"]
             axes.plot(1e3 * best["arm"], best[key], "o", color=line.get_color())
-        axes.set(xlim=(-60.0, 90.0), ylim=(0.0, None))
-        StudyText("fig14").label(axes, "planes", strength=strength)
+        StudyText("fig14").label(axes, key)
+        axes.set_ylim(0.0, None)
         axes.legend()
     return figure

@@ -15,23 +15,10 @@ import numpy as np
 import scipy
 from matplotlib.figure import Figure
 
+from hand_models import experiments
 from hand_models.base import COLOUR_OF, Array, EmptySetError, InvalidInputError, Progress
 from hand_models.compliance import Gripper, gripper_table
-from hand_models.experiments import (
-    Conditions,
-    HullPoints,
-    Limit,
-    StudyResult,
-    StudyText,
-    clipped_vertices,
-    distance_along,
-    limit,
-    panels,
-    rest_state,
-    sharpened,
-    track,
-    volume,
-)
+from hand_models.experiments import Conditions, HullPoints, Limit, StudyResult, StudyText
 from hand_models.parameters import ParameterTable, experiment_table
 from hand_models.studies.settings import STUDY_SETTINGS
 
@@ -46,29 +33,22 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     InvalidInputError
         If the gripper's fingers do not lie on both surfaces, or it holds at no tension.
     """
-    table = gripper_table(hand)
-    settings = experiment_table()
+    table, settings = gripper_table(hand), experiment_table()
     least, most = settings.vector("fig15", "tensions")
-    tensions = STUDY_SETTINGS.fig15_tensions
-    tried = np.linspace(least, most, tensions)
+    tried = np.linspace(least, most, STUDY_SETTINGS.fig15_tensions)
     diameters = settings.vector("parameter_studies", "diameters")
     each = [Conditions(*pair) for pair in itertools.product(diameters, tried.tolist())]
-    found = [_at(conditions.gripper(table)) for conditions in track(progress, each)]
+    found = [_at(conditions.gripper(table)) for conditions in experiments.track(progress, each)]
     # at each tension; none where nothing holds
     values = ("shear", "pure_shear", "normal", "volume", "pressed_share")
     failing = ("shear_phalanges", "normal_phalanges")
     curves = []
     for i, diameter in enumerate(diameters):
-        rows = found[i * tensions : (i + 1) * tensions]
-        curves.append(
-            {
-                "diameter": diameter,
-                "state": [row["state"] for row in rows],
-                **{key: np.array([row.get(key, np.nan) for row in rows]) for key in values},
-                **{key: [row.get(key, []) for row in rows] for key in failing},
-                "closing_alone_fails_at": _closing_limit(table, diameter, tried),
-            }
-        )
+        rows = found[i * len(tried) : (i + 1) * len(tried)]
+        curve: dict[str, Any] = {"diameter": diameter, "state": [row["state"] for row in rows]}
+        curve |= {key: np.array([row.get(key, np.nan) for row in rows]) for key in values}
+        curve |= {key: [row.get(key, []) for row in rows] for key in failing}
+        curves.append({**curve, "closing_alone_fails_at": _closing_limit(table, diameter, tried)})
     data: dict[str, Any] = {
         "surface": each[0].surface,
         "force_to_moment": settings.scalar("parameter_studies", "force_to_moment"),
@@ -76,29 +56,30 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "curves": curves,
     }
     text = StudyText("fig15")
-    _check(text, tried, curves)
+    _check(text, tried, *map(_Curve, curves))
     return text.result(data)
 
 
 def _at(grasp: Gripper) -> dict[str, Any]:
     """Return the limits of a gripper, and what is behind them."""
-    state = rest_state(grasp)
+    state = experiments.rest_state(grasp)
     cuts, starts = STUDY_SETTINGS.fig15_cuts, STUDY_SETTINGS.fig15_starts
     try:
         points = HullPoints.explored(grasp, STUDY_SETTINGS.fig15_rays)
-        points, _ = sharpened(grasp, points, "shear", cuts, starts)
-        points, normal = sharpened(grasp, points, "normal", cuts, starts)
+        points, _ = experiments.sharpened(grasp, points, "shear", cuts, starts)
+        points, normal = experiments.sharpened(grasp, points, "normal", cuts, starts)
         # the points added for one limit may raise the other
-        shear = limit(points.wrenches, "shear")
+        shear = experiments.limit(points.wrenches, "shear")
     except EmptySetError:
         return {"state": state}
     ratio = experiment_table().scalar("parameter_studies", "force_to_moment")
+    pure = experiments.distance_along(points.wrenches, np.array([[1.0, 0.0, 1.0 / ratio]]))[0]
     return {
         "state": state,
         "shear": shear.value,
-        "pure_shear": distance_along(points.wrenches, np.array([[1.0, 0.0, 1.0 / ratio]]))[0],
+        "pure_shear": pure,
         "normal": normal.value,
-        "volume": volume(clipped_vertices(points.wrenches)),
+        "volume": experiments.volume(experiments.clipped_vertices(points.wrenches)),
         "pressed_share": _pressed_share(grasp, points, shear),
         "shear_phalanges": _phalanges(points, shear),
         "normal_phalanges": _phalanges(points, normal),
@@ -128,17 +109,14 @@ def _closing_limit(table: ParameterTable, diameter: float, tried: Array) -> floa
         return max(float(verdict.utilisation[0]) - 1.0, float(verdict.violation[0]))
 
     over = [excess(float(tension)) > 0.0 for tension in tried]
-    if not any(over):
-        return None
+    if over[0] or not any(over):
+        return float(tried[0]) if over[0] else None
     first = over.index(True)
-    if first == 0:
-        return float(tried[0])
     return float(scipy.optimize.bisect(excess, tried[first - 1], tried[first], xtol=0.1))  # [N]
 
 
-def _check(text: StudyText, tried: Array, curves: list[dict[str, Any]]) -> None:
+def _check(text: StudyText, tried: Array, strong: _Curve, weak: _Curve) -> None:
     """Hold the sentences of Section 7.1 against the curves, as far as closing alone holds."""
-    strong, weak = (_Curve(curve) for curve in curves)
     # share of the largest limit by which one may wander where it is said to fall: hulls are found
     # by local search
     slack = 0.02
@@ -151,79 +129,70 @@ def _check(text: StudyText, tried: Array, curves: list[dict[str, Any]]) -> None:
             field="hand",
         )
     for curve in (strong, weak):
-        best, moderate = curve.best("volume"), curve.last // 2
-        widened = curve["volume"][moderate] / curve["volume"][0]
-        given = f"{widened:.3g} times as much at {tried[moderate]:g} N as at {tried[0]:g} N"
-        text.check("moderate", given, widened > 1.0, where=curve.name)
-        given = f"{tried[best]:g} N of {tried[0]:g} to {tried[curve.last]:g} N"
-        text.check("not_large", given, 0 < best < curve.last, where=curve.name)
-    most, sheared = weak["normal"][weak.last], weak["normal"][weak.best("shear")]
-    given = f"{most:.1f} N at {tried[weak.last]:g} N, "
-    given += f"{sheared:.1f} N at {tried[weak.best('shear')]:g} N"
-    text.check("normal_on_flat", given, most > sheared, where=weak.name)
+        best, half, last = curve.best("volume"), curve.last // 2, curve.last
+        widened = curve["volume"][half] / curve["volume"][0]
+        ends = {"where": curve.name, "least": tried[0], "most": tried[last]}
+        text.check("moderate", widened > 1.0, widened=widened, half=tried[half], **ends)
+        text.check("not_large", 0 < best < last, best=tried[best], **ends)
+    best, last = weak.best("shear"), weak.last
+    at_best, at_most = weak["normal"][best], weak["normal"][last]
+    found = {"at_best": at_best, "best": tried[best], "at_most": at_most, "most": tried[last]}
+    text.check("normal_on_flat", at_most > at_best, where=weak.name, **found)
     for curve in (weak, strong):
-        best = curve.best("shear")
-        after = curve["shear"][best : curve.last + 1]
+        best, last = curve.best("shear"), curve.last
+        after = curve["shear"][best : last + 1]
         falls = bool((np.diff(after) <= slack * after[0]).all())
-        given = f"most, {after[0]:.1f} N, at {tried[best]:g} N; {after[-1]:.1f} N at "
-        given += f"{tried[curve.last]:g} N" + ("" if falls else "; not steadily")
+        found = {"first": after[0], "best": tried[best], "last": after[-1], "most": tried[last]}
         holds = len(after) > 1 and falls and after[-1] < (1.0 - slack) * after[0]
-        text.check("reduces_shear", given, holds, where=curve.name)
+        steadily = "" if falls else "; not steadily"
+        text.check("reduces_shear", holds, where=curve.name, steadily=steadily, **found)
+    names = {"strong": strong.name, "weak": weak.name}
     for force in ("shear", "normal"):
         high, low = strong[force][both], weak[force][both]
-        ratios = low / high
-        given = f"{ratios.min():.2f} to {ratios.max():.2f} times that on {strong.name}"
-        text.check("lower", given, (low < high).all(), force=force)
-        given = (
-            f"by {np.ptp(low):.1f} N, on {strong.name} by {np.ptp(high):.1f} N, over the tensions "
-            "at which both hold"
-        )
-        text.check("less_sensitive", given, np.ptp(low) < np.ptp(high), force=force)
+        ratios, own, other = low / high, np.ptp(low), np.ptp(high)
+        ends = {"least": ratios.min(), "most": ratios.max()}
+        text.check("lower", (low < high).all(), force=force, **ends, **names)
+        text.check("less_sensitive", own < other, force=force, own=own, other=other, **names)
     curved, flat = (float(np.mean(curve["pressed_share"][both])) for curve in (strong, weak))
-    given = f"{curved:.0%}, {flat:.0%}; mean over the tensions at which both hold"
-    text.check("normal_share", given, curved > flat, strong=strong.name, weak=weak.name)
+    text.check("normal_share", curved > flat, curved=curved, flat=flat, **names)
     steps = range(strong.best("shear"), strong.last + 1)
     beyond = [strong[f"{force}_phalanges"][i] for i in steps for force in ("shear", "normal")]
-    others = sorted({p for found in beyond for p in found} - {"proximal", "distal"})
-    ends = sum("proximal" in found or "distal" in found for found in beyond)
-    given = f"at {ends} of {len(beyond)} limits; also: {', '.join(others) or 'nobody'}"
-    text.check("ends_fail", given, 2 * ends > len(beyond), where=strong.name)
+    others = ", ".join(sorted(set().union(*beyond) - {"proximal", "distal"})) or "nobody"
+    ends_fail = sum("proximal" in found or "distal" in found for found in beyond)
+    shares = {"ends": ends_fail, "of": len(beyond), "others": others}
+    text.check("ends_fail", 2 * ends_fail > len(beyond), where=strong.name, **shares)
 
 
-class _Curve:
+class _Curve(dict[str, Any]):
     """The limits on a surface, and where closing alone holds."""
 
     def __init__(self, curve: dict[str, Any]) -> None:
+        super().__init__(curve)
         self.name = f"{1e3 * curve['diameter']:g} mm"
         self.holds = (np.array(curve["state"]) == "holds") & np.isfinite(curve["shear"])
         self.last = int(np.flatnonzero(self.holds)[-1]) if self.holds.any() else 0
-        self.curve = curve
-
-    def __getitem__(self, key: str) -> Any:
-        return self.curve[key]
 
     def best(self, key: str) -> int:
         """Return at which of the tensions that hold a value is largest."""
-        return int(np.where(self.holds, self.curve[key], -np.inf).argmax())
+        return int(np.where(self.holds, self[key], -np.inf).argmax())
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw the shear and normal limits over the tension, dotted where closing alone fails."""
     data, tension, text = result.data, result.data["tension"], StudyText("fig15")
-    figure, both = panels(1, 2, (12.0, 4.8))
+    figure, both = experiments.panels(1, 2, (12.0, 4.8))
+    colours = COLOUR_OF["blue"], COLOUR_OF["red"]
     for axes, force in zip(both, ("shear", "normal"), strict=True):
-        for curve, colour in zip(
-            data["curves"], (COLOUR_OF["blue"], COLOUR_OF["red"]), strict=True
-        ):
-            values, fails = curve[force], curve["closing_alone_fails_at"]
-            held = np.where(np.array(curve["state"]) == "holds", values, np.nan)
-            name = f"{1e3 * curve['diameter']:g} mm"
-            axes.plot(tension, values, ":", color=colour)
-            axes.plot(tension, held, color=colour, label=name)
+        for curve, colour in zip(map(_Curve, data["curves"]), colours, strict=True):
+            fails = curve["closing_alone_fails_at"]
+            held = np.where(np.array(curve["state"]) == "holds", curve[force], np.nan)
+            axes.plot(tension, curve[force], ":", color=colour)
+            axes.plot(tension, held, color=colour, label=curve.name)
             if fails is not None:
                 axes.axvline(fails, color=colour, alpha=0.4, linestyle="--")
-                place = {"xycoords": axes.get_xaxis_transform(), "textcoords": "offset points"}
-                axes.annotate(name, (fails, 0.02), (4.0, 0.0), rotation=90.0, color=colour, **place)
+                place: Any = {"xycoords": axes.get_xaxis_transform(), "rotation": 90.0}
+                place |= {"textcoords": "offset points", "color": colour}
+                axes.annotate(curve.name, (fails, 0.02), (4.0, 0.0), **place)
         text.label(axes, force, ratio=data["force_to_moment"])
         axes.set(xlim=(0.0, tension[-1]), ylim=(0.0, None))
         axes.legend(title="diameter")

@@ -15,23 +15,10 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
+from hand_models import experiments
 from hand_models.base import Array, Progress
 from hand_models.compliance import gripper_table
-from hand_models.experiments import (
-    Axis,
-    Conditions,
-    Measure,
-    StudyResult,
-    StudyText,
-    conditions_title,
-    draw_map,
-    legend,
-    panels,
-    part,
-    radius_axes,
-    sweep_cell,
-    sweep_map,
-)
+from hand_models.experiments import Axis, Conditions, Measure, StudyResult, StudyText
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table
 from hand_models.studies.settings import STUDY_SETTINGS
@@ -57,14 +44,14 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     done, total = 0, sum(n * n * len(surfaces) for _, surfaces, n, _ in jobs)
     data: dict[str, Any] = {}
     for key, surfaces, n, measures in jobs:
-        axes, data[key] = radius_axes(table, n), {}
+        axes, data[key] = experiments.radius_axes(table, n), {}
         for name, conditions in surfaces.items():
-            report = part(progress, done, done + n * n, total)
-            data[key][name] = sweep_map(table, *axes, conditions, measures, report)
+            report = experiments.part(progress, done, done + n * n, total)
+            data[key][name] = experiments.sweep_map(table, *axes, conditions, measures, report)
             done += n * n
     data["in_use"] = {
         name: {
-            at: sweep_cell(table, surfaces[name], MEASURES_SHOWN)
+            at: experiments.sweep_cell(table, surfaces[name], MEASURES_SHOWN)
             for at, surfaces in (("usual", usual), ("lower", lower))
         }
         for name in usual
@@ -97,20 +84,20 @@ def _check(text: StudyText, data: dict[str, Any]) -> None:
         middle, distal = np.meshgrid(usual["x"]["values"], usual["y"]["values"])
         fails = usual["state"] != "holds"
         above, below = fails[distal > middle], fails[distal <= middle]
-        given = f"{above.mean():.0%} of those where it is, {below.mean():.0%} of the others"
-        text.check("distal_larger", given, above.mean() > below.mean(), surface=name)
-        text.check("every_larger", f"{above.mean():.0%}", above.all(), surface=name)
+        shares = {"above": above.mean(), "below": below.mean()}
+        text.check("distal_larger", above.mean() > below.mean(), surface=name, **shares)
+        text.check("every_larger", above.all(), surface=name, **shares)
     for name in maps:
         cell = data["in_use"][name]["usual"]
         given = ", ".join([cell["state"], *(f"{m} {v:.1f} N" for m, v in cell["limits"].items())])
         holds = cell["state"] == "holds" and all(v > 0.0 for v in cell["limits"].values())
-        text.check("in_use", given, holds, surface=name)
+        text.check("in_use", holds, got=given, surface=name)
     for name in maps:
         high, low = maps[name], states[name]
         tension, lower = (found["conditions"]["tension"] for found in (high, low))
-        given = f"{low['failing']:.1%}, {high['failing']:.1%} at {tension:g} N"
+        found = {"fewer": low["failing"], "more": high["failing"]}
         fewer = low["failing"] < high["failing"]
-        text.check("lower_tension", given, fewer, surface=name, tension=tension, lower=lower)
+        text.check("lower_tension", fewer, surface=name, tension=tension, lower=lower, **found)
     for name, measure in itertools.product(maps, MEASURES_SHOWN):
         high, low = maps[name]["limits"][measure], data["maps_at_lower_tension"][name]
         # cell by cell of the coarser map
@@ -119,17 +106,13 @@ def _check(text: StudyText, data: dict[str, Any]) -> None:
         ratios = (low["limits"][measure] / thinned)[thinned > 0.0]
         ratios = ratios[np.isfinite(ratios)]
         ratio = float(np.median(ratios)) if len(ratios) else float("nan")
-        given, tension = (
-            f"{ratio:.2f} of it ({len(ratios)} cells)",
-            maps[name]["conditions"]["tension"],
-        )
-        text.check(
-            "lower_limits", given, ratio < 1.0, surface=name, measure=measure, tension=tension
-        )
+        tension = maps[name]["conditions"]["tension"]
+        found = {"ratio": ratio, "cells": len(ratios), "tension": tension}
+        text.check("lower_limits", ratio < 1.0, surface=name, measure=measure, **found)
     # a contact force depends on a radius by more than 1e-6 N/mm
     moved = np.abs(1e-3 * data["normal_slopes"]) > 1e-6
-    given = ", ".join(f"{name} {n}" for name, n in zip(PHALANGES, moved.sum(axis=0), strict=True))
-    text.check("every_force", given, moved.all())
+    given = experiments.listed(PHALANGES, moved.sum(axis=0), "")
+    text.check("every_force", moved.all(), got=given)
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
@@ -141,10 +124,10 @@ def plot(result: StudyResult) -> dict[str, Figure]:
 
 
 def _draw(maps: dict[str, dict[str, Any]]) -> Figure:
-    figure, shown = panels(len(MEASURES_SHOWN), len(maps), (12.0, 10.0), grid="none")
+    figure, shown = experiments.panels(len(MEASURES_SHOWN), len(maps), (12.0, 10.0), grid="none")
     each = itertools.product(MEASURES_SHOWN, maps.items())
     for axes, (measure, (name, data)) in zip(shown, each, strict=True):
-        draw_map(axes, data, measure)
-        axes.set_title(f"{name}: {conditions_title(data['conditions'])}")
-    legend(figure, list(maps.values()))
+        experiments.draw_map(axes, data, measure)
+        axes.set_title(f"{name}: {experiments.conditions_title(data['conditions'])}")
+    experiments.legend(figure, list(maps.values()))
     return figure
