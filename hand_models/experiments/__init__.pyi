@@ -2,6 +2,7 @@ from .force_limits import (
     HullPoints as HullPoints,
     Limit as Limit,
     Measure as Measure,
+    closing_limit as closing_limit,
     limit as limit,
     rest_state as rest_state,
     sharpened as sharpened,
@@ -39,6 +40,7 @@ from .posterior import (
 )
 from .pulling import (
     Pulled as Pulled,
+    balance_matrix as balance_matrix,
     even_pulls as even_pulls,
     explored as explored,
     held_wrenches as held_wrenches,
@@ -66,12 +68,14 @@ from .sweep_axis import Axis as Axis, Conditions as Conditions
 from .wrench_hull import (
     PLANAR_SCALE as PLANAR_SCALE,
     Extents as Extents,
+    best_moments as best_moments,
     clipped_vertices as clipped_vertices,
     distance_along as distance_along,
     edge as edge,
     extents as extents,
     in_paper_signs as in_paper_signs,
     loading_planes as loading_planes,
+    pull_off_map as pull_off_map,
     reach_toward as reach_toward,
     section as section,
     strongest as strongest,

@@ -7,7 +7,7 @@ point is sought there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -33,6 +33,7 @@ __all__ = [
     "Limit",
     "Measure",
     "State",
+    "closing_limit",
     "limit",
     "rest_state",
     "sharpened",
@@ -111,6 +112,16 @@ class HullPoints:
             np.vstack([self.poses, with_mirrored(poses)]),
             self.phalanges + phalanges + phalanges,
         )
+
+    def failing(self, found: Limit) -> list[str]:
+        """Return whose contacts fail at the corners between which a limit lies."""
+        return sorted({self.phalanges[i] or "dragged backwards" for i in found.corners})
+
+    def pressed_share(self, grasp: Gripper, found: Limit) -> float:
+        """Return which part of F_x at a limit the normal forces of the contacts make up."""
+        right, left = grasp.finger_loads(self.poses[found.corners])
+        along = [(-side.normals * side.directions[..., 1]).sum(axis=1) for side in (right, left)]
+        return float(found.weights @ (along[0] - along[1])) / found.value if found.value else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,3 +311,25 @@ def unloaded_pose(grasp: Gripper) -> Array | None:
         return None
     root = scipy.optimize.brentq(push, way[crossed[0]], way[crossed[0] + 1])
     return np.array([0.0, float(root), 0.0])
+
+
+def closing_limit(gripper: Callable[[float], Gripper], tried: Array) -> float | None:
+    """Return the tension from which on closing alone overloads a tile, if it is among those tried.
+
+    Parameters
+    ----------
+    gripper : callable
+        Returns the gripper at a tension [N].
+    tried : ndarray, shape (n,)
+        Ascending tensions; a tile that is overloaded from the least of them on counts as that [N].
+    """
+
+    def excess(tension: float) -> float:
+        verdict = gripper(tension).evaluate(np.zeros((1, 3)))
+        return max(float(verdict.utilisation[0]) - 1.0, float(verdict.violation[0]))
+
+    over = [excess(float(tension)) > 0.0 for tension in tried]
+    if over[0] or not any(over):
+        return float(tried[0]) if over[0] else None
+    first = over.index(True)
+    return float(scipy.optimize.bisect(excess, tried[first - 1], tried[first], xtol=0.1))  # [N]

@@ -1,7 +1,7 @@
-"""How well linearised sets represent the hull of a planar gripper's wrenches.
+"""Comparison of linearised sets with the hull of a planar gripper's wrenches.
 
-Sets are compared by their support functions, in directions that are evenly spread over the hull.
-Wrenches are (F_x, F_z, M_y) in the paper's signs.
+The sets are compared by their support functions, in directions that are evenly spread over the
+hull. Wrenches are (F_x, F_z, M_y) in the paper's signs.
 """
 
 from __future__ import annotations

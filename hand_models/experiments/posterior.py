@@ -197,6 +197,12 @@ class Posterior:
         off = ((values - self.fit.wanted) / wide)[:, used]
         return np.asarray(-0.5 * (off**2).sum(axis=1) - np.log(wide[used]).sum())
 
+    def likeliest(self) -> Array:
+        """Return the likeliest set (n,) of all at which the model was computed, by all data."""
+        there, everything = np.isfinite(self.values).all(axis=1), np.isfinite(self.fit.wanted)
+        logs = self.log_likelihood(self.values[there], everything)
+        return np.asarray(self.sets[there][logs.argmax()])
+
     def _compute(self, sets: Array, tick: Callable[[], None]) -> Array:
         """Return the model's values of new sets, and keep them."""
         found = []

@@ -17,6 +17,7 @@ from hand_models.base import Array, EmptySetError, Progress
 from hand_models.compliance import (
     COMPLEX_STEP,
     GRIPPER_SIDES,
+    FingerLoads,
     Gripper,
     Numbers,
     WristSearch,
@@ -33,6 +34,7 @@ from hand_models.finger import PHALANGES
 
 __all__ = [
     "Pulled",
+    "balance_matrix",
     "even_pulls",
     "explored",
     "held_wrenches",
@@ -209,6 +211,33 @@ def pulled_off_poses(gripper: Gripper, pulls: Array) -> Array:
             break
         poses.append(at[0])
     return np.array(poses)
+
+
+def balance_matrix(gripper: Gripper, poses: Array, loads: FingerLoads) -> Array:
+    """Return A of Eq. 7 for one finger, A f_c = b, in SI units, shape (m, 6, 6).
+
+    f_c is the force of each of three contacts on the rock, (x, z) in the finger's frame F, proximal
+    first. A takes f_c to the torques of three joints (Jᵀ; from x toward z) [m], and to the three
+    components along the phalanges (P_x) [1]. The condition number depends on these two units.
+
+    Parameters
+    ----------
+    gripper : Gripper
+    poses : ndarray, shape (m, 3)
+        Poses (x, z, ω_y) of the wrist, with x = ω_y = 0 [m, m, rad].
+    loads : FingerLoads
+        Loads of the finger at these poses.
+    """
+    u = np.asarray(loads.directions, dtype=float)
+    # of each joint, proximal first: the base, and where the phalanges before it end
+    ends = gripper.finger.model.joint_spacing * np.cumsum(u[:, :-1], axis=1)
+    joints = np.pad(ends, ((0, 0), (1, 0), (0, 0))) + poses[:, None, :2]
+    arms = loads.points[:, None] - joints[:, :, None]
+    turned = np.stack([-arms[..., 1], arms[..., 0]], axis=-1)
+    # a joint bears the contacts beyond it; along a phalanx there is its own
+    each = np.eye(len(PHALANGES))[:, :, None]
+    rows = [turned * each.cumsum(axis=1), u[:, None] * each]
+    return np.concatenate(rows, axis=1).reshape(len(poses), 6, 6)
 
 
 def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) -> Pulled:

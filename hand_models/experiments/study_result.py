@@ -103,7 +103,7 @@ class StudyText:
         self.claims.append(Claim(**_filled(words | own, values)))
 
     def label(self, axes: Any, name: str, **values: Any) -> None:
-        """Set the title, labels and ranges of axes from ``studies.toml``.
+        """Set the title, labels and ranges of axes from ``studies.toml``, and draw their legend.
 
         Parameters
         ----------
@@ -113,7 +113,11 @@ class StudyText:
         **values
             Values of the placeholders in the texts.
         """
-        axes.set(**_filled(self._words["axes"][name], values))
+        words = _filled(self._words["axes"][name], values)
+        legend = words.pop("legend", None)
+        axes.set(**words)
+        if legend is not None:
+            axes.legend(**_filled(legend, values))
 
     def result(self, data: dict[str, Any]) -> StudyResult:
         """Return the study's result: data, title from ``studies.toml``, and the claims checked.

@@ -23,12 +23,14 @@ from hand_models.wrench_spaces import WRENCH_SCALE, hull, hull_facets
 __all__ = [
     "PLANAR_SCALE",
     "Extents",
+    "best_moments",
     "clipped_vertices",
     "distance_along",
     "edge",
     "extents",
     "in_paper_signs",
     "loading_planes",
+    "pull_off_map",
     "reach_toward",
     "section",
     "strongest",
@@ -314,6 +316,38 @@ def strongest(points: Array) -> dict[str, dict[str, Any]]:
 def _strengths(points: Array) -> dict[str, Array]:
     """Return what wrenches count for, by force and by moment."""
     return {"force": np.hypot(points[:, 0], points[:, 1]), "moment": np.abs(points[:, 2])}
+
+
+def pull_off_map(points: Array, force_x: Array, moment: Array) -> dict[str, Array]:
+    """Return the least F_z of a hull (n, 3) over (F_x, M_y), a row for each M_y; NaN outside."""
+    x, m = np.meshgrid(force_x, moment)
+    start = np.column_stack([x.ravel(), 0.0 * x.ravel(), m.ravel()])
+    down = np.tile([0.0, -1.0, 0.0], (len(start), 1))
+    least = -distance_along(points, down, start).reshape(x.shape)
+    return {"force_x": force_x, "moment": moment, "force_z": least}
+
+
+def best_moments(points: Array, force_x: Array) -> dict[str, Array]:
+    """Return, for each F_x > 0, the best M_y for pulling off, the strength there and at M_y = 0.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Wrenches whose hull it is [N, N, N·m].
+    force_x : ndarray, shape (m,)
+        Ascending values of F_x; those from which on no wrench pulls off are left out [N].
+    """
+    found = []
+    for force in force_x[force_x > 0.0]:
+        at = np.array([force, 0.0, 0.0])
+        cut = section(points - at, (1.0, 0.0, 0.0))
+        if not len(cut) or cut[:, 1].min() >= 0.0:
+            break
+        _, least, best = cut[cut[:, 1].argmin()]
+        without = distance_along(points, np.array([[0.0, -1.0, 0.0]]), at)[0]
+        found.append((force, best, -least, without))
+    names = ("force_x", "best_moment", "strength", "strength_without")
+    return dict(zip(names, np.reshape(found, (-1, len(names))).T, strict=True))
 
 
 def _slack(points: Array) -> float:

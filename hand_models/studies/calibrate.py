@@ -42,9 +42,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     found = search.run(lambda: progress(next(ticks), search.evaluations))
     wide = fit.deviations(search.discrepancy)
     rows = _foretold(fit, {name: each.quantiles(wide) for name, each in found.items()})
-    whole, everything = found[""], np.ones(len(fit.data), dtype=bool)
-    there = np.isfinite(search.values).all(axis=1)
-    best = search.sets[there][search.log_likelihood(search.values[there], everything).argmax()]
+    whole, best = found[""], search.likeliest()
     off = np.sqrt((((whole.values - fit.wanted) / wide) ** 2).mean(axis=1))
     kept = [
         {"misfit": float(off[i]), "at": whole.sets[i], "values": fit.values(whole.sets[i])}
@@ -83,17 +81,18 @@ def _foretold(fit: GripperFit, intervals: Mapping[str, Array]) -> list[dict[str,
     """Return each datum, and the intervals (3, k) that all figures and the others give it."""
     rows = []
     for i, datum in enumerate(fit.data):
-        row: dict[str, Any] = {
+        low, _, high = foretold = intervals[datum.figure][:, i]
+        row = {
             "datum": datum.label,
             "figure": datum.figure,
             "unit": datum.unit,
             "wanted": datum.wanted,
             "reading": datum.reading,
             "fitted": intervals[""][:, i],
-            "foretold": intervals[datum.figure][:, i],
+            "foretold": foretold,
+            "inside": bool(low <= datum.wanted <= high),
         }
-        low, _, high = row["foretold"]
-        rows.append({**row, "inside": bool(low <= datum.wanted <= high)})
+        rows.append(row)
     return rows
 
 
@@ -128,11 +127,9 @@ def plot(result: StudyResult) -> dict[str, Figure]:
     left.set_yticks(range(len(residuals)), [row["datum"] for row in residuals[::-1]])
     left.axvline(1.0, color="black", linestyle="--", linewidth=1.0)
     covered = ", ".join("{} of {}".format(*each) for each in result.data["coverage"].values())
-    left.set(
-        xlabel="interval of 90 %, over the figure's value [1]; black: fitted to it as well",
-        title=f"foretold by the other figures: {covered}",
-        xlim=(-0.5, 3.0),
-    )
+    intervals = "interval of 90 %, over the figure's value [1]; black: fitted to it as well"
+    title = f"foretold by the other figures: {covered}"
+    left.set(title=title, xlabel=intervals, xlim=(-0.5, 3.0))
     for place, number in enumerate(numbers[::-1]):
         low, high = number["plausible"]
         least, most = ((end - low) / (high - low) for end in number["of_sets"])
@@ -141,11 +138,9 @@ def plot(result: StudyResult) -> dict[str, Figure]:
         right.plot(best, place, "o", color=blue)
         right.plot(recorded, place, "D", markerfacecolor="none", markeredgecolor="black")
     right.set_yticks(range(len(numbers)), [number["name"] for number in numbers[::-1]])
-    right.set(
-        xlabel="share of the plausible range [1]; dot: likeliest, diamond: recorded",
-        title=f"numbers; bars: {len(result.data['sets'])} samples of the posterior",
-        xlim=(-0.05, 1.05),
-    )
+    title = f"numbers; bars: {len(result.data['sets'])} samples of the posterior"
+    shares = "share of the plausible range [1]; dot: likeliest, diamond: recorded"
+    right.set(title=title, xlabel=shares, xlim=(-0.05, 1.05))
     return {"calibrate": figure}
 
 

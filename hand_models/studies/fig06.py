@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,6 +17,8 @@ from hand_models.studies.settings import STUDY_SETTINGS
 from hand_models.tendon import share_load
 
 __all__ = ["plot", "run"]
+
+Pair = tuple[int, int]
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
@@ -49,37 +50,33 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "curves": [_curve(experiment, pair, frictions, stiffnesses) for pair in pairs],
         "friction_axis": frictions,
         "preload_axis": stiffnesses,
-        "preload_stiffness_at_printed_gain": _least_gain_is_printed(experiment, pairs, stiffnesses),
+        "preload_stiffness_at_printed_gain": _of_printed_gain(experiment, pairs, stiffnesses),
     }
     return _checked(experiment, data)
 
 
-def _curve(
-    experiment: PalmExperiment, pair: Sequence[int], frictions: Array, stiffnesses: Array
-) -> dict[str, Any]:
+def _curve(experiment: PalmExperiment, pair: Pair, mu: Array, kp: Array) -> dict[str, Any]:
     """Return load over μ and gain over k_p of a pair, and where μ is best by Eq. 2."""
     k2, k1 = sorted(experiment.springs[number - 1] for number in pair)
-    others = [replace(experiment, preload_stiffness=kp) for kp in stiffnesses]
+    others = [replace(experiment, preload_stiffness=stiffness) for stiffness in kp]
     return {
         "springs": pair,
         "best_friction": 2.0 * (k1 - k2) / (k1 + k2),
-        "load_over_friction": np.array([experiment.load(pair, mu) for mu in frictions]),
+        "load_over_friction": np.array([experiment.load(pair, friction) for friction in mu]),
         "gain_over_preload_stiffness": np.array([other.gain(pair) for other in others]),
     }
 
 
-def _least_gain_is_printed(
-    experiment: PalmExperiment, pairs: Sequence[Sequence[int]], stiffnesses: Array
-) -> float | None:
+def _of_printed_gain(experiment: PalmExperiment, pairs: list[Pair], kp: Array) -> float | None:
     """Return the k_p at which the least gain of all pairs is the printed one [N/m], if any is."""
 
     def excess(stiffness: float) -> float:
         softer = replace(experiment, preload_stiffness=stiffness)
         return min(softer.gain(pair) for pair in pairs) - STUDY_SETTINGS.fig06_printed_gain
 
-    if excess(stiffnesses[0]) < 0.0 or excess(stiffnesses[-1]) > 0.0:
+    if excess(kp[0]) < 0.0 or excess(kp[-1]) > 0.0:
         return None
-    return float(scipy.optimize.brentq(excess, stiffnesses[0], stiffnesses[-1]))
+    return float(scipy.optimize.brentq(excess, kp[0], kp[-1]))
 
 
 def _checked(experiment: PalmExperiment, data: dict[str, Any]) -> StudyResult:
@@ -109,9 +106,7 @@ def _checked(experiment: PalmExperiment, data: dict[str, Any]) -> StudyResult:
     return text.result(data)
 
 
-def _against_equations(
-    experiment: PalmExperiment, pair: Sequence[int]
-) -> tuple[float, float, float]:
+def _against_equations(experiment: PalmExperiment, pair: Pair) -> tuple[float, float, float]:
     """Return how far a pair is off Eqs. 1 and 3, relatively, and what of its load friction shifts.
 
     The load shifted is that which the stiffer contact carries more.
@@ -142,11 +137,11 @@ def plot(result: StudyResult) -> dict[str, Figure]:
     rods = f"fixed rods, μ = {data['friction']:g}"
     drawn = bars.bar(places + 0.2, held, 0.4, color=COLOUR_OF["blue"], label=rods)
     bars.bar_label(drawn, [f"{100 * c['gain']:+.0f} %" for c in shown], color=red)
-    bars.set_xticks(places, [_name(c["springs"]) for c in shown])
+    bars.set_xticks(places, ["-".join(map(str, c["springs"])) for c in shown])
     bars.set_ylim(0.0, 1.2 * max(held))
     # springs 1-3 and 2-3 gain alike: by Eq. 3 the gain depends on the stiffer one alone
     for curve, style in zip(data["curves"], itertools.cycle(("-", "-", "--")), strict=False):
-        name, loads = _name(curve["springs"]), curve["load_over_friction"]
+        name, loads = "-".join(map(str, curve["springs"])), curve["load_over_friction"]
         (line,) = friction.plot(data["friction_axis"], loads / loads[0], style, label=name)
         colour = line.get_color()
         friction.axvline(curve["best_friction"], color=colour, linestyle=":", linewidth=1.0)
@@ -158,11 +153,4 @@ def plot(result: StudyResult) -> dict[str, Figure]:
     text.label(bars, "bars", springs=", ".join(f"{1e-3 * k:g}" for k in data["contact_springs"]))
     text.label(friction, "friction")
     text.label(preload, "preload", friction=data["friction"])
-    bars.legend(loc="upper left")
-    friction.legend(title="springs")
-    preload.legend(title="springs")
     return {"fig06": figure}
-
-
-def _name(springs: Sequence[int]) -> str:
-    return "-".join(map(str, springs))

@@ -18,10 +18,10 @@ from hand_models.studies.settings import STUDY_SETTINGS
 
 __all__ = ["plot", "run"]
 
-RODS: Final = {"tiles": False, "tiles and palm": True}
+ROD_VARIANTS: Final = {"tiles": False, "tiles and palm": True}
 """Which pulleys are fixed rods: True if the palm's are, too."""
 
-COLOURS: Final = (COLOUR_OF["blue"], COLOUR_OF["green"])
+ROD_COLOURS: Final = (COLOUR_OF["blue"], COLOUR_OF["green"])
 Loaded = list[dict[str, Any]]
 """Configurations of springs, each a dictionary with its loads and gains."""
 
@@ -78,7 +78,9 @@ def _loaded(experiment: PalmExperiment) -> Loaded:
     for sequence in itertools.product(numbers, repeat=STUDY_SETTINGS.fig07_tiles):
         if sequence <= sequence[::-1]:
             without = experiment.load(sequence, 0.0)
-            held = {rods: experiment.load(sequence, mu, mu * own) for rods, own in RODS.items()}
+            held = {
+                rods: experiment.load(sequence, mu, mu * own) for rods, own in ROD_VARIANTS.items()
+            }
             gain = {rods: load / without - 1.0 for rods, load in held.items()}
             loads = {"load_without_friction": without, "load_with_friction": held}
             found.append({"springs": sequence, **loads, "gain": gain})
@@ -92,7 +94,7 @@ def _unlike(configurations: Loaded) -> Loaded:
 def _gains(configurations: Loaded) -> dict[str, Any]:
     """Return the range of gains, how many reach the printed one, and where friction hurts."""
     summaries = {}
-    for rods in RODS:
+    for rods in ROD_VARIANTS:
         gains = np.array([c["gain"][rods] for c in configurations])
         summaries[rods] = {
             "configurations": len(gains),
@@ -139,20 +141,18 @@ def _draw_sequences(data: dict[str, Any]) -> Figure:
     figure, (loads, gains) = panels(2, 1, (14.0, 7.5), grid="y", sharex=True)
     without = [1e-3 * c["load_without_friction"] for c in shown]
     loads.bar(places - 0.28, without, 0.28, color="0.7", label="bearings everywhere, μ = 0")
-    for shift, rods, colour in zip((0.0, 0.28), RODS, COLOURS, strict=True):
+    for shift, rods, colour in zip((0.0, 0.28), ROD_VARIANTS, ROD_COLOURS, strict=True):
         height = [1e-3 * c["load_with_friction"][rods] for c in shown]
         label = f"rods at {rods}, μ = {data['friction']:g}"
         loads.bar(places + shift, height, 0.28, color=colour, label=label)
         gain = [100.0 * c["gain"][rods] for c in shown]
         gains.plot(places, gain, "o", color=colour, label=f"rods at {rods}")
-    text.label(loads, "loads", stiffness=1e-3 * data["preload_stiffness"])
     loads.set_ylim(top=1.35 * loads.get_ylim()[1])
-    loads.legend(loc="upper left", ncols=3)
+    text.label(loads, "loads", stiffness=1e-3 * data["preload_stiffness"])
     _draw_printed_gain(gains, label="printed, at least")
     gains.set_xticks(places, ["".join(map(str, c["springs"])) for c in shown], rotation=90)
     gains.set_xlim(-0.8, len(shown) - 0.2)
     text.label(gains, "gains", springs=", ".join(f"{1e-3 * k:g}" for k in data["contact_springs"]))
-    gains.legend(loc="upper left")
     return figure
 
 
@@ -169,7 +169,7 @@ def _draw_dependence(data: dict[str, Any]) -> Figure:
         (softest, "by_number_of_softest_tiles", "softest_tiles", 1.0, 0.1),
         (preload, "sensitivity", "preload_stiffness", 1e-3, 0.015),
     ):
-        for side, rods, colour in zip((-1.0, 1.0), RODS, COLOURS, strict=True):
+        for side, rods, colour in zip((-1.0, 1.0), ROD_VARIANTS, ROD_COLOURS, strict=True):
             ranges = [entry["variants"][rods] for entry in data[entries]]
             x = np.array([scale * entry[key] + side * apart for entry in data[entries]])
             low, middle, high = (
@@ -187,5 +187,4 @@ def _draw_dependence(data: dict[str, Any]) -> Figure:
     preload.margins(x=0.12)
     text.label(softest, "softest")
     text.label(preload, "preload")
-    softest.legend(loc="upper right")
     return figure

@@ -15,8 +15,14 @@ from matplotlib.figure import Figure
 
 from hand_models import experiments
 from hand_models.base import COLOUR_OF, Array, Progress
-from hand_models.compliance import FingerLoads, Gripper, gripper_table
-from hand_models.experiments import FIT_TOLERANCES, Conditions, StudyResult, StudyText
+from hand_models.compliance import gripper_table
+from hand_models.experiments import (
+    FIT_TOLERANCES,
+    Conditions,
+    StudyResult,
+    StudyText,
+    balance_matrix,
+)
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table
 from hand_models.studies.settings import STUDY_SETTINGS
@@ -91,34 +97,6 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     return text.result(data)
 
 
-def balance_matrix(gripper: Gripper, poses: Array, loads: FingerLoads) -> Array:
-    """Return A of Eq. 7 for one finger, A f_c = b, in SI units, shape (m, 6, 6).
-
-    f_c is the force of each of three contacts on the rock, (x, z) in the finger's frame F, proximal
-    first. A takes f_c to the torques of three joints (Jᵀ; from x toward z) [m], and to the three
-    components along the phalanges (P_x) [1]. The condition number depends on these two units.
-
-    Parameters
-    ----------
-    gripper : Gripper
-    poses : ndarray, shape (m, 3)
-        Poses (x, z, ω_y) of the wrist, with x = ω_y = 0 [m, m, rad].
-    loads : FingerLoads
-        Loads of the finger at these poses.
-    """
-    count, u = len(PHALANGES), np.asarray(loads.directions, dtype=float)
-    # of each joint, proximal first: the base, and where the phalanges before it end
-    ends = gripper.finger.model.joint_spacing * np.cumsum(u[:, :-1], axis=1)
-    joints = np.pad(ends, ((0, 0), (1, 0), (0, 0))) + poses[:, None, :2]
-    A = np.zeros((len(poses), 2 * count, 2 * count))
-    for j in range(count):
-        A[:, count + j, 2 * j : 2 * j + 2] = u[:, j]
-        for i in range(j + 1):
-            d = loads.points[:, j] - joints[:, i]
-            A[:, i, 2 * j : 2 * j + 2] = np.column_stack([-d[:, 1], d[:, 0]])
-    return A
-
-
 def _check_lines(text: StudyText, data: dict[str, Any], table: ParameterTable) -> None:
     share, least = FIT_TOLERANCES.force_share, FIT_TOLERANCES.least_force
     for kind in ("shear", "normal"):
@@ -180,9 +158,8 @@ def plot(result: StudyResult) -> dict[str, Figure]:
             axes.plot(data["until_slip"]["pull"], data["until_slip"][kind][:, i], ":", color=colour)
             axes.plot([0.0, data["pull_of_figure"]], read, "o", color=colour, mfc="white")
             axes.plot(slip["pull"], slip[kind][i], "x", color=colour)
-        text.label(axes, "forces", kind=kind)
         axes.set_ylim(min(0.0, 1.2 * min(slip[kind])), None)
-        axes.legend(title=f"×: a tile lets go, {slip['pull']:.1f} N")
+        text.label(axes, "forces", kind=kind, pull=slip["pull"])
     condition.plot(data["pull"], data["condition"], color="k")
     condition.axhline(data["condition_printed"], color=COLOUR_OF["red"], linewidth=1.0)
     text.label(condition, "condition")

@@ -80,37 +80,13 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
             "hull_over_pull": experiments.spread(filled),
         },
         "asymmetry": experiments.asymmetry(shown, supports),
-        "pull_off": _pull_off(full, force_x, moment),
-        "positive_moment": _positive_moment(full, force_x),
+        "pull_off": experiments.pull_off_map(full, force_x, moment),
+        "positive_moment": experiments.best_moments(full, force_x),
         "linearised": experiments.linearised(gripper, full, supports),
         "linear_pieces": experiments.linear_pieces(gripper, full, few, report),
     }
     progress(steps, steps)
     return _checked(data, table)
-
-
-def _pull_off(points: Array, force_x: Array, moment: Array) -> dict[str, Array]:
-    """Return the least F_z of a hull over (F_x, M_y), a row for each M_y; no number outside."""
-    x, m = np.meshgrid(force_x, moment)
-    start = np.column_stack([x.ravel(), 0.0 * x.ravel(), m.ravel()])
-    down = np.tile([0.0, -1.0, 0.0], (len(start), 1))
-    least = -experiments.distance_along(points, down, start).reshape(x.shape)
-    return {"force_x": force_x, "moment": moment, "force_z": least}
-
-
-def _positive_moment(points: Array, force_x: Array) -> dict[str, Array]:
-    """Return, for each F_x > 0, the best M_y for pulling off, the strength there and at M_y = 0."""
-    found = []
-    for force in force_x[force_x > 0.0]:
-        at = np.array([force, 0.0, 0.0])
-        slice_ = experiments.section(points - at, (1.0, 0.0, 0.0))
-        if not len(slice_) or slice_[:, 1].min() >= 0.0:
-            break
-        _, least, best = slice_[slice_[:, 1].argmin()]
-        without = experiments.distance_along(points, np.array([[0.0, -1.0, 0.0]]), at)[0]
-        found.append((force, best, -least, without))
-    names = ("force_x", "best_moment", "strength", "strength_without")
-    return dict(zip(names, np.reshape(found, (-1, len(names))).T, strict=True))
 
 
 def _checked(data: dict[str, Any], table: ParameterTable) -> StudyResult:
@@ -159,9 +135,8 @@ def plot(result: StudyResult) -> dict[str, Figure]:
         axes.fill(outline[:, 0], outline[:, second], color=COLOUR_OF["blue"], alpha=0.2)
         axes.plot(pulled[:, 0], pulled[:, second], ".", color="0.4", markersize=3)
         axes.plot([*x, *-x], [*y, *mirrored], "x", color=COLOUR_OF["red"], label="read off Fig. 13")
-        text.label(axes, name)
         axes.grid(alpha=0.3)
-        axes.legend(loc="lower right")
+        text.label(axes, name)
     _draw_strength(strength, data["pull_off"], data["positive_moment"])
     text.label(strength, "strength")
     return {"fig13": figure}
@@ -195,4 +170,3 @@ def _draw_strength(axes: Any, field: dict[str, Array], best: dict[str, Array]) -
     inside = drawn[above, columns] & drawn[above - 1, columns]
     line = np.where(inside, best["best_moment"], np.nan)
     axes.plot(best["force_x"], line, color=COLOUR_OF["red"], label="best M_y for each F_x")
-    axes.legend(loc="upper left")

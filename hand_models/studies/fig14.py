@@ -176,7 +176,6 @@ def _draw_failures(surfaces: list[dict[str, Any]]) -> Figure:
         experiments.label_solid(solid, f"{name}: first failure, F_z downward")
         text.label(top, "top", surface=name)
         text.label(side, "side", surface=name)
-        top.legend(fontsize=8, loc="upper left")
     return figure
 
 
@@ -188,7 +187,6 @@ def _draw_planes(surfaces: list[dict[str, Any]]) -> Figure:
             (line,) = axes.plot(1e3 * planes["arm"], planes[key], label=_name(surface))
             best = planes[f"best_for_{key}"]
             axes.plot(1e3 * best["arm"], best[key], "o", color=line.get_color())
-        StudyText("fig14").label(axes, key)
         axes.set_ylim(0.0, None)
-        axes.legend()
+        StudyText("fig14").label(axes, key)
     return figure

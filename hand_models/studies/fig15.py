@@ -8,17 +8,15 @@ wrench it has one without F_x and M_y of the same F_z.
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import numpy as np
-import scipy
 from matplotlib.figure import Figure
 
 from hand_models import experiments
 from hand_models.base import COLOUR_OF, Array, EmptySetError, InvalidInputError, Progress
 from hand_models.compliance import Gripper, gripper_table
-from hand_models.experiments import Conditions, HullPoints, Limit, StudyResult, StudyText
+from hand_models.experiments import Conditions, HullPoints, StudyResult, StudyText
 from hand_models.parameters import ParameterTable, experiment_table
 from hand_models.studies.settings import STUDY_SETTINGS
 
@@ -34,23 +32,15 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         If the gripper's fingers do not lie on both surfaces, or it holds at no tension.
     """
     table, settings = gripper_table(hand), experiment_table()
-    least, most = settings.vector("fig15", "tensions")
-    tried = np.linspace(least, most, STUDY_SETTINGS.fig15_tensions)
+    (least, most), count = settings.vector("fig15", "tensions"), STUDY_SETTINGS.fig15_tensions
+    tried = np.linspace(least, most, count)
     diameters = settings.vector("parameter_studies", "diameters")
-    each = [Conditions(*pair) for pair in itertools.product(diameters, tried.tolist())]
-    found = [_at(conditions.gripper(table)) for conditions in experiments.track(progress, each)]
-    # at each tension; none where nothing holds
-    values = ("shear", "pure_shear", "normal", "volume", "pressed_share")
-    failing = ("shear_phalanges", "normal_phalanges")
     curves = []
-    for i, diameter in enumerate(diameters):
-        rows = found[i * len(tried) : (i + 1) * len(tried)]
-        curve: dict[str, Any] = {"diameter": diameter, "state": [row["state"] for row in rows]}
-        curve |= {key: np.array([row.get(key, np.nan) for row in rows]) for key in values}
-        curve |= {key: [row.get(key, []) for row in rows] for key in failing}
-        curves.append({**curve, "closing_alone_fails_at": _closing_limit(table, diameter, tried)})
+    for done, diameter in enumerate(diameters):
+        steps = count * done, count * (done + 1), count * len(diameters)
+        curves.append(_curve(table, diameter, tried, experiments.part(progress, *steps)))
     data: dict[str, Any] = {
-        "surface": each[0].surface,
+        "surface": Conditions.surface,
         "force_to_moment": settings.scalar("parameter_studies", "force_to_moment"),
         "tension": tried,
         "curves": curves,
@@ -58,6 +48,26 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     text = StudyText("fig15")
     _check(text, tried, *map(_Curve, curves))
     return text.result(data)
+
+
+def _curve(
+    table: ParameterTable, diameter: float, tried: Array, progress: Progress
+) -> dict[str, Any]:
+    """Return the limits on a surface at each tension; none where nothing holds."""
+
+    def gripper(tension: float) -> Gripper:
+        return Conditions(diameter, tension).gripper(table)
+
+    rows = [_at(gripper(tension)) for tension in experiments.track(progress, tried.tolist())]
+    values = ("shear", "pure_shear", "normal", "volume", "pressed_share")
+    failing = ("shear_phalanges", "normal_phalanges")
+    return {
+        "diameter": diameter,
+        "state": [row["state"] for row in rows],
+        **{key: np.array([row.get(key, np.nan) for row in rows]) for key in values},
+        **{key: [row.get(key, []) for row in rows] for key in failing},
+        "closing_alone_fails_at": experiments.closing_limit(gripper, tried),
+    }
 
 
 def _at(grasp: Gripper) -> dict[str, Any]:
@@ -80,39 +90,10 @@ def _at(grasp: Gripper) -> dict[str, Any]:
         "pure_shear": pure,
         "normal": normal.value,
         "volume": experiments.volume(experiments.clipped_vertices(points.wrenches)),
-        "pressed_share": _pressed_share(grasp, points, shear),
-        "shear_phalanges": _phalanges(points, shear),
-        "normal_phalanges": _phalanges(points, normal),
+        "pressed_share": points.pressed_share(grasp, shear),
+        "shear_phalanges": points.failing(shear),
+        "normal_phalanges": points.failing(normal),
     }
-
-
-def _phalanges(points: HullPoints, found: Limit) -> list[str]:
-    """Return whose contacts fail at the corners between which a limit lies."""
-    return sorted({points.phalanges[i] or "dragged backwards" for i in found.corners})
-
-
-def _pressed_share(grasp: Gripper, points: HullPoints, found: Limit) -> float:
-    """Return which part of F_x at a limit the normal forces of the contacts make up."""
-    right, left = grasp.finger_loads(points.poses[found.corners])
-    along = [(-side.normals * side.directions[..., 1]).sum(axis=1) for side in (right, left)]
-    return float(found.weights @ (along[0] - along[1])) / found.value if found.value else 0.0
-
-
-def _closing_limit(table: ParameterTable, diameter: float, tried: Array) -> float | None:
-    """Return the tension from which on closing alone overloads a tile, if it is among those tried.
-
-    A tile overloaded from the least tension on counts as that.
-    """
-
-    def excess(tension: float) -> float:
-        verdict = Conditions(diameter, tension).gripper(table).evaluate(np.zeros((1, 3)))
-        return max(float(verdict.utilisation[0]) - 1.0, float(verdict.violation[0]))
-
-    over = [excess(float(tension)) > 0.0 for tension in tried]
-    if over[0] or not any(over):
-        return float(tried[0]) if over[0] else None
-    first = over.index(True)
-    return float(scipy.optimize.bisect(excess, tried[first - 1], tried[first], xtol=0.1))  # [N]
 
 
 def _check(text: StudyText, tried: Array, strong: _Curve, weak: _Curve) -> None:
@@ -124,8 +105,7 @@ def _check(text: StudyText, tried: Array, strong: _Curve, weak: _Curve) -> None:
     if not both.any():
         raise InvalidInputError(
             f"exceeds a limit at every closing tension from {tried[0]:g} to {tried[-1]:g} N, on a "
-            f"surface of {strong.name} or on one of {weak.name}: "
-            "take a stronger hand",
+            f"surface of {strong.name} or on one of {weak.name}: take a stronger hand",
             field="hand",
         )
     for curve in (strong, weak):
@@ -193,8 +173,7 @@ def plot(result: StudyResult) -> dict[str, Figure]:
                 place: Any = {"xycoords": axes.get_xaxis_transform(), "rotation": 90.0}
                 place |= {"textcoords": "offset points", "color": colour}
                 axes.annotate(curve.name, (fails, 0.02), (4.0, 0.0), **place)
-        text.label(axes, force, ratio=data["force_to_moment"])
         axes.set(xlim=(0.0, tension[-1]), ylim=(0.0, None))
-        axes.legend(title="diameter")
+        text.label(axes, force, ratio=data["force_to_moment"])
     figure.suptitle(data["surface"])
     return {"fig15": figure}

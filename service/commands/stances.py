@@ -301,9 +301,10 @@ def _from_toml(text: bytes) -> dict[str, Any]:
         If the text is not TOML in UTF-8.
     """
     try:
-        return _in_64_bits(tomllib.loads(text.decode()))
+        content: dict[str, Any] = _in_64_bits(tomllib.loads(text.decode()))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise wire.MalformedError(f"not valid TOML: {error or 'nested too deep'}") from None
+    return content
 
 
 def _in_64_bits(content: Any) -> Any:
