@@ -27,6 +27,7 @@ from .pictures import (
     PHALANX_COLOURS as PHALANX_COLOURS,
     conditions_title as conditions_title,
     draw_map as draw_map,
+    draw_solid as draw_solid,
     label_solid as label_solid,
     legend as legend,
     panels as panels,

@@ -6,21 +6,27 @@ from collections.abc import Collection, Sequence
 from typing import Any, Final, Literal
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from trimesh.remesh import subdivide
 
-from hand_models.base import COLOUR_OF
+from hand_models.base import COLOUR_OF, Array
 from hand_models.experiments.force_limits import MEASURE_UNITS, Measure
+from hand_models.experiments.wrench_hull import PLANAR_SCALE
 from hand_models.finger import PHALANGES
+from hand_models.wrench_spaces import hull
 
 __all__ = [
     "PHALANX_COLOURS",
     "conditions_title",
     "draw_map",
+    "draw_solid",
     "entry_name",
     "label_solid",
     "legend",
@@ -93,6 +99,23 @@ def label_solid(axes: Any, title: str) -> None:
     axes.invert_zaxis()
     axes.set_box_aspect(None, zoom=0.85)
     axes.view_init(elev=25.0, azim=-50.0)
+
+
+def draw_solid(axes: Any, points: Array, title: str) -> None:
+    """Draw the part F_z < 0 of the hull of wrenches (n, 3), coloured by F_z, and label its axes."""
+    simplices = hull(points * PLANAR_SCALE).simplices
+    # those below F_z = 0, not on it; each is subdivided for its colours
+    triangles = simplices[points[simplices, 1].min(axis=1) < -1e-6]
+    corners = points
+    for _ in range(4):
+        corners, triangles = subdivide(corners, triangles)
+    faces = corners[triangles]
+    colours = colormaps["viridis"](faces[:, :, 1].mean(axis=1) / points[:, 1].min())
+    drawn = Poly3DCollection(faces[:, :, [0, 2, 1]], facecolors=colours, edgecolor=colours, lw=0.2)
+    axes.add_collection3d(drawn)
+    low, high = points.min(axis=0), points.max(axis=0)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[2], high[2]), zlim=(low[1], 0.0))
+    label_solid(axes, title)
 
 
 def conditions_title(conditions: dict[str, Any]) -> str:

@@ -22,6 +22,7 @@ ROD_VARIANTS: Final = {"tiles": False, "tiles and palm": True}
 """Which pulleys are fixed rods: True if the palm's are, too."""
 
 ROD_COLOURS: Final = (COLOUR_OF["blue"], COLOUR_OF["green"])
+
 Loaded = list[dict[str, Any]]
 """Configurations of springs, each a dictionary with its loads and gains."""
 

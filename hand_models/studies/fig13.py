@@ -11,10 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-from trimesh.remesh import subdivide
 
 from hand_models import experiments
 from hand_models.base import COLOUR_OF, Array, Progress
@@ -32,13 +29,11 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     table, numbers = experiment_table(), gripper_table(hand)
     conditions, settings = Conditions.of_figure("fig13"), STUDY_SETTINGS
     gripper = conditions.gripper(numbers)
-    # of progress: steps at the end of the pulls, of the list of sets, and in all
-    after_pulls, after_list, steps = 300, 980, 1000
+    after_pulls, steps = 300, 1000  # of progress: at the end of the pulls, and in all
     report = experiments.part(progress, 0, after_pulls, steps)
     found, pulled, whole = experiments.explored(gripper, settings.fig13_pulls, report)
-    size = np.abs(experiments.clipped_vertices(experiments.in_paper_signs(found.wrenches))).max(
-        axis=0
-    )
+    searched = experiments.clipped_vertices(experiments.in_paper_signs(found.wrenches))
+    size = np.abs(searched).max(axis=0)
     full, shown = experiments.vertices(whole), experiments.clipped_vertices(whole)
     # those that press no more than the paper's surface
     pressing_less = conditions.gripper(numbers, table.scalar("fig13", "top"))
@@ -51,7 +46,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     side = -float(experiments.edge(held[:, [0, 1]] * (1.0, -1.0), np.array([side_at]))[0])
     supports = experiments.even_directions(settings.fig13_supports, size)
     few = experiments.even_directions(settings.fig13_piece_directions, size)
-    report = experiments.part(progress, after_pulls, after_list, steps)
+    report = experiments.part(progress, after_pulls, steps, steps)
     data: dict[str, Any] = {
         "diameter": conditions.diameter,
         "tension": conditions.tension,
@@ -85,7 +80,6 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "linearised": experiments.linearised(gripper, full, supports),
         "linear_pieces": experiments.linear_pieces(gripper, full, few, report),
     }
-    progress(steps, steps)
     return _checked(data, table)
 
 
@@ -119,11 +113,10 @@ def _checked(data: dict[str, Any], table: ParameterTable) -> StudyResult:
 def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw the hull of wrenches from the side, from above and along F_x, and the pull-off map."""
     data, text = result.data, StudyText("fig13")
-    figure, (solid, top, side, strength) = experiments.panels(
-        2, 2, (14.0, 10.0), grid="none", solids=(0,)
-    )
+    figure, all_axes = experiments.panels(2, 2, (14.0, 10.0), grid="none", solids=(0,))
+    solid, top, side, strength = all_axes
     points, pulled = data["hull_vertices"], data["pulls"]["wrenches"]
-    _draw_solid(solid, points)
+    experiments.draw_solid(solid, points, "hull, F_z ≤ 0, F_z downward, the paper's signs")
     edge_x, _, edge_moment = data["edge"].values()
     side_x, _, side_z = data["side"].values()
     # the surface is skew symmetric: what was read off on one side is on both
@@ -140,22 +133,6 @@ def plot(result: StudyResult) -> dict[str, Figure]:
     _draw_strength(strength, data["pull_off"], data["positive_moment"])
     text.label(strength, "strength")
     return {"fig13": figure}
-
-
-def _draw_solid(axes: Any, points: Array) -> None:
-    simplices = hull(points * PLANAR_SCALE).simplices
-    # those below F_z = 0, not on it; each is subdivided for its colours
-    triangles = simplices[points[simplices, 1].min(axis=1) < -1e-6]
-    corners = points
-    for _ in range(4):
-        corners, triangles = subdivide(corners, triangles)
-    faces = corners[triangles]
-    colours = colormaps["viridis"](faces[:, :, 1].mean(axis=1) / points[:, 1].min())
-    drawn = Poly3DCollection(faces[:, :, [0, 2, 1]], facecolors=colours, edgecolor=colours, lw=0.2)
-    axes.add_collection3d(drawn)
-    low, high = points.min(axis=0), points.max(axis=0)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[2], high[2]), zlim=(low[1], 0.0))
-    experiments.label_solid(axes, "hull, F_z ≤ 0, F_z downward, the paper's signs")
 
 
 def _draw_strength(axes: Any, field: dict[str, Array], best: dict[str, Array]) -> None:

@@ -32,18 +32,11 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     diameters, tension = table.vector("fig14", "diameters"), table.scalar("fig14", "tension")
     cases = [(diameter, tension) for diameter in diameters]
     cases += [(max(diameters), other) for other in table.vector("fig14", "other_tensions")]
-    surfaces, steps = [], 1000  # of progress in all
+    surfaces = []
     for done, case in enumerate(cases):
-        start, end = (steps * i // len(cases) for i in (done, done + 1))
-        report = experiments.part(progress, start, end, steps)
+        report = experiments.part(progress, 1000 * done, 1000 * (done + 1), 1000 * len(cases))
         surfaces.append(_surface(Conditions(*case, "sandpaper-36"), hand, report))
-    progress(steps, steps)
-    # the two diameters with the same tension come first
-    text, of_diameters = StudyText("fig14"), surfaces[:2]
-    _check_failures(text, *of_diameters)
-    _check_planes(text, of_diameters, table)
-    _check_sizes(text, *surfaces)
-    return text.result({"phalanges": PHALANGES, "surfaces": surfaces})
+    return _checked(surfaces, table)
 
 
 def _surface(conditions: Conditions, hand: ParameterTable, progress: Progress) -> dict[str, Any]:
@@ -84,7 +77,9 @@ def _listed(surface: dict[str, Any]) -> str:
     )
 
 
-def _check_failures(text: StudyText, near: dict[str, Any], far: dict[str, Any]) -> None:
+def _checked(surfaces: list[dict[str, Any]], table: ParameterTable) -> StudyResult:
+    # the two diameters with the same tension come first
+    text, (near, far, *_) = StudyText("fig14"), surfaces
     phalanges = np.array(near["pulls"]["phalanx"])
     text.check("proximal_first", (phalanges == "proximal").mean() > 0.5, got=_listed(near))
     force_x, _, moment = near["pulls"]["wrenches"].T
@@ -94,18 +89,14 @@ def _check_failures(text: StudyText, near: dict[str, Any], far: dict[str, Any]) 
         text.check("distal_where", here < others, here=here, others=others)
     else:
         text.check("distal_where", False, got="no distal failure")
-    beside = ("dragged_backwards", "no_pose")  # no limits of a tile
-    limits = [entry for entry in far["shares"] if entry["way"] not in beside]
-    mine = sum(entry["share"] for entry in limits if entry["phalanx"] == "proximal")
-    letting_go = 100 * mine / sum(entry["share"] for entry in limits) if limits else 0.0
-    only = set(far["pulls"]["phalanx"]) == {"proximal"}
-    text.check("proximal_only", only, shares=_listed(far), letting_go=letting_go)
-
-
-def _check_planes(text: StudyText, surfaces: list[dict[str, Any]], table: ParameterTable) -> None:
+    proximal = np.array(far["pulls"]["phalanx"]) == "proximal"
+    # by a limit of a tile
+    let_go = ~np.isin(far["pulls"]["way"], ("dragged_backwards", "no_pose"))
+    letting_go = 100 * proximal[let_go].mean() if let_go.any() else 0.0
+    text.check("proximal_only", proximal.all(), shares=_listed(far), letting_go=letting_go)
     fitted = table.scalar("fig13", "diameter")
     about = 0.25  # share within which a figure printed as "about" is met
-    for surface in surfaces:
+    for surface in (near, far):
         where = f"on {1e3 * surface['diameter']:g} mm"
         # the gripper's numbers were fitted to those planes on the surface of Fig. 13
         role: Role = "calibration" if surface["diameter"] == fitted else "test"
@@ -121,28 +112,25 @@ def _check_planes(text: StudyText, surfaces: list[dict[str, Any]], table: Parame
             text.check("best_plane", holds, role=role, where=where, aim=aim, **found)
         holds = 0.0 < ratios["moment"] < ratios["force"]
         text.check("higher_for_force", holds, where=where, **ratios)
-    anchor, best = table.scalar("fig14", "anchor"), surfaces[0]["planes"]["best_for_force"]
+    anchor, best = table.scalar("fig14", "anchor"), near["planes"]["best_for_force"]
     arm, span = best["arm"], "nowhere else"
     if best["arms_as_good"]:
         span = "from {:.2f} to {:.2f} cm".format(*(100 * arm for arm in best["arms_as_good"]))
     found = {"arm": 100 * arm, "anchor": 100 * anchor, "about": 100 * about}
     text.check("anchor", abs(arm - anchor) <= about * anchor, span=span, **found)
-
-
-def _check_sizes(text: StudyText, near: dict[str, Any], *others: dict[str, Any]) -> None:
     sizes = {**near["extents"], "volume": near["volume"]}
-    for surface in others:
+    for surface in surfaces[1:]:
         here = {**surface["extents"], "volume": surface["volume"]}
         shares = {name: 100 * here[name] / size for name, size in sizes.items()}
         tensions = {"far": surface["tension"], "near": near["tension"]}
         text.check("smaller", max(shares.values()) < 100.0, **shares, **tensions)
+    return text.result({"phalanges": PHALANGES, "surfaces": surfaces})
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw the failing phalanges over the wrench spaces, and the force and moment in each plane."""
     surfaces = result.data["surfaces"]
-    of_diameters = surfaces[:2]
-    return {"fig14": _draw_failures(of_diameters), "fig14_planes": _draw_planes(surfaces)}
+    return {"fig14": _draw_failures(surfaces[:2]), "fig14_planes": _draw_planes(surfaces)}
 
 
 def _name(surface: dict[str, Any]) -> str:
@@ -157,11 +145,11 @@ def _draw_failures(surfaces: list[dict[str, Any]]) -> Figure:
         fails, ways = (np.array(surface["pulls"][key]) for key in ("phalanx", "way"))
         dragged = ways == "dragged_backwards"
         for phalanx, colour in experiments.PHALANX_COLOURS.items():
-            for marker, those, how in (
-                (".", ~dragged, "lets go"),
-                ("x", dragged, "dragged backwards"),
+            for marker, how, at in (
+                (".", "lets go", ~dragged),
+                ("x", "dragged backwards", dragged),
             ):
-                x, z, moment = wrenches[(fails == phalanx) & those].T
+                x, z, moment = wrenches[(fails == phalanx) & at].T
                 style: Any = {"color": colour, "marker": marker, "label": f"{phalanx} {how}"}
                 if len(x):
                     solid.scatter(x, moment, z, s=12, depthshade=False, **style)
