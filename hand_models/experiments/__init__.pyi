@@ -3,6 +3,7 @@ from .force_limits import (
     Limit as Limit,
     Measure as Measure,
     closing_limit as closing_limit,
+    gripper_limits as gripper_limits,
     limit as limit,
     rest_state as rest_state,
     sharpened as sharpened,

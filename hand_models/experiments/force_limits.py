@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 import scipy
@@ -23,7 +23,13 @@ from hand_models.compliance import (
     farthest,
     search_box,
 )
-from hand_models.experiments.wrench_hull import in_paper_signs, with_mirrored
+from hand_models.experiments.wrench_hull import (
+    clipped_vertices,
+    distance_along,
+    in_paper_signs,
+    volume,
+    with_mirrored,
+)
 from hand_models.parameters import experiment_table
 from hand_models.wrench_spaces import Row
 
@@ -34,6 +40,7 @@ __all__ = [
     "Measure",
     "State",
     "closing_limit",
+    "gripper_limits",
     "limit",
     "rest_state",
     "sharpened",
@@ -259,6 +266,44 @@ def _farther(grasp: Gripper, points: HullPoints, found: Limit, starts: int) -> F
         if end.reach - reached.max() > 1e-3 * abs(found.value):
             return end
     return None
+
+
+def gripper_limits(grasp: Gripper, rays: int, cuts: int, starts: int) -> dict[str, Any]:
+    """Return the state of a gripper, its shear and normal limits, and what is behind them.
+
+    Parameters
+    ----------
+    grasp : Gripper
+    rays, cuts, starts : int
+        Effort of the search: parameters of `HullPoints.explored` and `sharpened`.
+
+    Returns
+    -------
+    dict
+        ``state`` (`rest_state`), and if any pose holds: ``shear``, ``normal`` and ``volume``
+        (`MEASURE_UNITS`), ``pure_shear``, the largest F_x of wrenches F_x = ratio · M_y with
+        F_z = 0, and of the limits ``pressed_share``, ``shear_phalanges`` and ``normal_phalanges``.
+    """
+    state = rest_state(grasp)
+    try:
+        points = HullPoints.explored(grasp, rays)
+        points, _ = sharpened(grasp, points, "shear", cuts, starts)
+        points, normal = sharpened(grasp, points, "normal", cuts, starts)
+        # the points added for one limit may raise the other
+        shear = limit(points.wrenches, "shear")
+    except EmptySetError:
+        return {"state": state}
+    ratio = experiment_table().scalar("parameter_studies", "force_to_moment")
+    return {
+        "state": state,
+        "shear": shear.value,
+        "pure_shear": distance_along(points.wrenches, np.array([[1.0, 0.0, 1.0 / ratio]]))[0],
+        "normal": normal.value,
+        "volume": volume(clipped_vertices(points.wrenches)),
+        "pressed_share": points.pressed_share(grasp, shear),
+        "shear_phalanges": points.failing(shear),
+        "normal_phalanges": points.failing(normal),
+    }
 
 
 def rest_state(grasp: Gripper) -> State:

@@ -118,11 +118,9 @@ def _against_equations(experiment: PalmExperiment, pair: Pair) -> tuple[float, f
     signs, own = np.array([1.0, -1.0]), np.array([k1, k2])
     by_1 = (2.0 * (2.0 + signs * mu) * k1 * k2 + 4.0 * kp * own) / below
     by_3 = (4.0 * k1 * k2 + 2.0 * kp * (k1 + k2)) / ((2.0 - mu) * k1 + 2.0 * kp)
-    return (
-        float(np.abs(loads / by_1 - 1.0).max()),
-        abs(experiment.load(pair, mu) / by_3 - 1.0),
-        float(loads[0] / loads.sum() - without[0] / without.sum()),
-    )
+    off_1 = float(np.abs(loads / by_1 - 1.0).max())
+    off_3 = abs(experiment.load(pair, mu) / by_3 - 1.0)
+    return off_1, off_3, float(loads[0] / loads.sum() - without[0] / without.sum())
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:

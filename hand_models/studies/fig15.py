@@ -14,9 +14,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hand_models import experiments
-from hand_models.base import COLOUR_OF, Array, EmptySetError, InvalidInputError, Progress
+from hand_models.base import COLOUR_OF, Array, InvalidInputError, Progress
 from hand_models.compliance import Gripper, gripper_table
-from hand_models.experiments import Conditions, HullPoints, StudyResult, StudyText
+from hand_models.experiments import Conditions, StudyResult, StudyText
 from hand_models.parameters import ParameterTable, experiment_table
 from hand_models.studies.settings import STUDY_SETTINGS
 
@@ -45,61 +45,35 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "tension": tried,
         "curves": curves,
     }
-    text = StudyText("fig15")
-    _check(text, tried, *map(_Curve, curves))
-    return text.result(data)
+    return _checked(data, *curves)
 
 
-def _curve(
-    table: ParameterTable, diameter: float, tried: Array, progress: Progress
-) -> dict[str, Any]:
+def _curve(table: ParameterTable, diameter: float, tried: Array, progress: Progress) -> _Curve:
     """Return the limits on a surface at each tension; none where nothing holds."""
 
     def gripper(tension: float) -> Gripper:
         return Conditions(diameter, tension).gripper(table)
 
-    rows = [_at(gripper(tension)) for tension in experiments.track(progress, tried.tolist())]
+    settings = STUDY_SETTINGS
+    effort = settings.fig15_rays, settings.fig15_cuts, settings.fig15_starts
+    tensions = experiments.track(progress, tried.tolist())
+    rows = [experiments.gripper_limits(gripper(tension), *effort) for tension in tensions]
     values = ("shear", "pure_shear", "normal", "volume", "pressed_share")
     failing = ("shear_phalanges", "normal_phalanges")
-    return {
+    curve = {
         "diameter": diameter,
         "state": [row["state"] for row in rows],
         **{key: np.array([row.get(key, np.nan) for row in rows]) for key in values},
         **{key: [row.get(key, []) for row in rows] for key in failing},
         "closing_alone_fails_at": experiments.closing_limit(gripper, tried),
     }
+    return _Curve(curve)
 
 
-def _at(grasp: Gripper) -> dict[str, Any]:
-    """Return the limits of a gripper, and what is behind them."""
-    state = experiments.rest_state(grasp)
-    cuts, starts = STUDY_SETTINGS.fig15_cuts, STUDY_SETTINGS.fig15_starts
-    try:
-        points = HullPoints.explored(grasp, STUDY_SETTINGS.fig15_rays)
-        points, _ = experiments.sharpened(grasp, points, "shear", cuts, starts)
-        points, normal = experiments.sharpened(grasp, points, "normal", cuts, starts)
-        # the points added for one limit may raise the other
-        shear = experiments.limit(points.wrenches, "shear")
-    except EmptySetError:
-        return {"state": state}
-    ratio = experiment_table().scalar("parameter_studies", "force_to_moment")
-    pure = experiments.distance_along(points.wrenches, np.array([[1.0, 0.0, 1.0 / ratio]]))[0]
-    return {
-        "state": state,
-        "shear": shear.value,
-        "pure_shear": pure,
-        "normal": normal.value,
-        "volume": experiments.volume(experiments.clipped_vertices(points.wrenches)),
-        "pressed_share": points.pressed_share(grasp, shear),
-        "shear_phalanges": points.failing(shear),
-        "normal_phalanges": points.failing(normal),
-    }
-
-
-def _check(text: StudyText, tried: Array, strong: _Curve, weak: _Curve) -> None:
+def _checked(data: dict[str, Any], strong: _Curve, weak: _Curve) -> StudyResult:
     """Hold the sentences of Section 7.1 against the curves, as far as closing alone holds."""
-    # share of the largest limit by which one may wander where it is said to fall: hulls are found
-    # by local search
+    text, tried = StudyText("fig15"), data["tension"]
+    # share of a limit by which it may wander where it is said to fall: a local search finds hulls
     slack = 0.02
     both = strong.holds & weak.holds
     if not both.any():
@@ -141,6 +115,7 @@ def _check(text: StudyText, tried: Array, strong: _Curve, weak: _Curve) -> None:
     ends_fail = sum("proximal" in found or "distal" in found for found in beyond)
     shares = {"ends": ends_fail, "of": len(beyond), "others": others}
     text.check("ends_fail", 2 * ends_fail > len(beyond), where=strong.name, **shares)
+    return text.result(data)
 
 
 class _Curve(dict[str, Any]):
