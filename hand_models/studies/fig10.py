@@ -35,8 +35,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     surface, array = Surface.named("sandpaper-36"), SpineArray.named("sandpaper-36")
     progress(0, 1)
     limit = surface.pull_off_angle
-    # loading angles φ of the trials and of the curves; "each point represents data of at least 5
-    # measurements"
+    # loading angles φ of the trials, each with "at least 5 measurements", and of the curves
     angles, repeats = np.radians(np.linspace(-30.0, 67.5, 14)), 5
     curve = np.radians(np.linspace(-30.0, 90.0, 121))
     loads = np.column_stack([np.cos(curve), -np.sin(curve), 0.0 * curve])
@@ -149,8 +148,7 @@ def _draw_curve(data: dict[str, Any]) -> Figure:
         (curve, planner["half_plane"], "planner, half-planes", None, {"color": "k", "ls": ":"}),
     ):
         polar.plot(np.degrees(angles), strength, label=label, **style)
-        shear, pull_off = strength * np.cos(angles), strength * np.sin(angles)
-        cartesian.plot(shear, pull_off, label=of_points, **style)
+        cartesian.plot(*strength * [np.cos(angles), np.sin(angles)], label=of_points, **style)
     text.label(polar, "polar")
     text.label(cartesian, "cartesian")
     return figure
