@@ -310,7 +310,9 @@ def _print(tally: bulk.Tally, before: int, elapsed: float, file: Path | None) ->
         tables.number("median ms", "2", ".1f", scale=1e3),
         tables.number("longest ms", "3", ".1f", scale=1e3),
     )
-    tables.print_rows(rows, columns, out, result=True)
+    tables.print_rows(rows, columns, out)
+    if tables.verbosity() < 0:
+        out.print(", ".join(f"{count} {answer}" for answer, count, *_ in rows if count) or "none")
     done = tally.count - before
     rate = done / elapsed if elapsed > 0.0 else 0.0
     known = f", {before} were answered before" if before else ""

@@ -339,7 +339,8 @@ def test_less_is_said_of_a_batch(lines, tmp_path, capfd):
     for quiet in ([], ["-q"]):
         run_command_line(["batch", str(lines), "-o", str(tmp_path / "t.csv"), *quiet])
         out = capfd.readouterr().out
-        assert ("error: invalid" in out) == (not quiet)
+        assert "error: invalid" in out
+        assert ("───" in out) == (not quiet)
         assert f"{COUNT} requests in" in out
 
 

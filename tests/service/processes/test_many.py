@@ -289,7 +289,7 @@ def test_with_a_file_the_summary_is_what_is_printed(batch_file, tmp_path, capfd)
     assert cells["infeasible"] == ["0", "-", "-"]
     assert cells["error:"] == ["deadline", "1", "-", "-"]
     assert run_command_line(["batch", path, "-o", str(kept), "--workers", "1", "-q"]) == 1
-    assert capfd.readouterr().out.startswith("answer optimal, requests 2, ")
+    assert capfd.readouterr().out.startswith("2 optimal, 1 overloaded, 1 error: deadline\n")
 
 
 def test_there_is_nothing_to_export_before_a_batch_has_answered(batch_file, tmp_path, capfd):
