@@ -193,10 +193,7 @@ class Decision:
                 (held if fits else failed).append(lift)
             new = [lift for lift in failed if lift not in others]
             if new:
-                _, met = self._lifts.expand(np.array(new), 0)
-                to = met[:, 1]
-                closed = self._nodes["closed"][np.maximum(to, 0)] == side
-                met = met[(to == -side) | ((to >= 0) & closed)]
+                met = self._parents_of(np.array(new), side)
                 order = np.argsort(met[:, 0], kind="stable")
                 met = met[order]
                 firsts = np.searchsorted(met[:, 0], [*new, len(self._nodes)])
@@ -285,16 +282,24 @@ class Decision:
         left = cut[self._nodes["out"][cut] == 0]
         if not len(left):
             return
-        _, met = self._lifts.expand(left, 0)
-        to = met[:, 1]
-        met = met[(to == -side) | ((to >= 0) & (self._nodes["closed"][to] == side))]
-        for other, parent, place in met.tolist():
+        for other, parent, place in self._parents_of(left, side).tolist():
             if not self._nodes["claimed"][other] & side and not self._ways.fails(
                 self._way(side, parent, other, place)
             ):
                 self._nodes["claimed"][other] |= side
                 parents[other], vias[other] = parent, place
         self._push(side, left[(self._nodes["claimed"][left] & side) > 0])
+
+    def _parents_of(self, lifts: Indices, side: int) -> Indices:
+        """Return rows (lift, parent, place) of what may come before lifts on the way from an end.
+
+        Parents are lifts that the side has closed, or the end itself, ``-side``.
+        """
+        _, met = self._lifts.expand(lifts, 0)
+        to = met[:, 1]
+        # an end is no index, and there may be fewer nodes than its number
+        closed = self._nodes["closed"][np.maximum(to, 0)] == side
+        return np.asarray(met[(to == -side) | ((to >= 0) & closed)])
 
     def _chain(self, side: int, lift: int) -> Iterator[Way]:
         """Return the ways from a lift back to its end; none from the end itself."""
