@@ -22,9 +22,9 @@ from planner.question.limits import BodyRange, Limits, Want, no_torque
 from planner.question.load import Load, Weights
 from planner.question.objectives import (
     MOVING_WRIST_OBJECTIVES,
-    OBJECTIVE_NEEDS,
     Objective,
     ObjectiveNeeds,
+    objective_needs,
 )
 from planner.question.open_loop import OpenLoopSettings
 from planner.question.stance import Stance, checked_body_wrench, known_choice, known_limbs
@@ -196,7 +196,7 @@ class Question:
     @property
     def needs(self) -> ObjectiveNeeds:
         """Needs of the objective."""
-        return OBJECTIVE_NEEDS.get(self.objective_name) or ObjectiveNeeds()
+        return objective_needs(self.objective_name)
 
     @property
     def utilisation_tolerance(self) -> float:

@@ -27,6 +27,7 @@ from service.requests import PlanRequest
 from service.wire import decode_request, schema
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.patience import PATIENCE
+from tests.suite.helpers.processes import ran
 from tests.suite.helpers.requests import HEAVY, flat_request, plan_request, put, wall_request
 from tests.suite.helpers.rocks import cylinder_mesh
 
@@ -179,16 +180,7 @@ from service.processes.many import Planners, plan_many
 
 
 def script(tmp_path: Path, body: str, guard: str = "") -> subprocess.CompletedProcess[str]:
-    path = tmp_path / "script.py"
-    path.write_text(SCRIPT.format(guard=guard, body=body))
-    return subprocess.run(
-        [sys.executable, str(path)],
-        capture_output=True,
-        text=True,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        timeout=PATIENCE,
-        check=False,
-    )
+    return ran(tmp_path, SCRIPT.format(guard=guard, body=body))
 
 
 @pytest.mark.slow

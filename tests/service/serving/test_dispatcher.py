@@ -29,6 +29,7 @@ from service.wire import LostError, service_key
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.odd_answers import never_ready, obedient
 from tests.suite.helpers.patience import PATIENCE, soon
+from tests.suite.helpers.processes import ran
 from tests.suite.helpers.served import client_config, free_endpoint
 
 PLAN = service_key("robosimian", "plan")
@@ -309,7 +310,6 @@ def test_a_service_whose_processes_do_not_start_says_so(alone: zenoh.Session) ->
 
 
 UNGUARDED = """
-import zenoh
 from service.serving import PlanService
 from tests.suite.helpers.served import lonely_session
 with lonely_session() as alone, PlanService(alone, workers=1):
@@ -319,16 +319,7 @@ with lonely_session() as alone, PlanService(alone, workers=1):
 
 @pytest.mark.slow
 def test_a_program_without_its_guard_ends_with_what_it_lacks(tmp_path: Path) -> None:
-    program = tmp_path / "program.py"
-    program.write_text(UNGUARDED)
-    done = subprocess.run(
-        [sys.executable, str(program)],
-        capture_output=True,
-        text=True,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        timeout=PATIENCE,
-        check=False,
-    )
+    done = ran(tmp_path, UNGUARDED)
     assert (done.returncode, done.stdout) == (1, "")
     assert "if __name__ == '__main__':" in done.stderr
     assert "LostError: none of the 1 workers started" in done.stderr

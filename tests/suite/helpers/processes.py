@@ -18,6 +18,20 @@ PROC = Path("/proc")
 watched = pytest.mark.skipif(not (PROC / "self/stat").exists(), reason="needs /proc")
 
 
+def ran(tmp_path: Path, program: str) -> subprocess.CompletedProcess[str]:
+    """A program of a user's own, in a file, that has ended by itself."""
+    path = tmp_path / "program.py"
+    path.write_text(program)
+    return subprocess.run(
+        [sys.executable, str(path)],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        timeout=PATIENCE,
+        check=False,
+    )
+
+
 def begun(*arguments: str, before: str = "", **more: object) -> subprocess.Popen[bytes]:
     """A command that has just been started, in a process that runs some code before it."""
     return subprocess.Popen(
